@@ -1,0 +1,128 @@
+//! CIELAB with the linear branch extended to negative light.
+//!
+//! ```text
+//! f(t) = t^(1/3)               for t > (6/29)^3
+//!      = t / (3 (6/29)^2) + 4/29    otherwise, below zero too
+//! L = 116 f(Y/Yn) − 16,  a = 500 (f(X/Xn) − f(Y/Yn)),  b = 200 (f(Y/Yn) − f(Z/Zn))
+//! ```
+//!
+//! Source: CIE 15:2018, 8.2.1. `L` may exceed 100 (sparkle, face readings of silvers) and may be negative (sensor
+//! noise); nothing is clamped. Do not average Lab to get a mean color: light adds in linear RGB.
+
+use serde::{Deserialize, Serialize};
+
+use super::rgb::{LinearRgb, rgb_to_xyz, xyz_to_rgb};
+use super::white::{D65_2, Illuminant, Observer, WhitePoint};
+
+/// CIELAB relative to the perfect diffuser, D65 and 2° observer unless it stands in a [`ReadingLab`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Lab {
+    /// Lightness, 0 black, 100 the perfect diffuser.
+    pub l: f64,
+    /// Green (−) to red (+).
+    pub a: f64,
+    /// Blue (−) to yellow (+).
+    pub b: f64,
+}
+
+/// A Lab value with the light and the observer it was read under.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReadingLab {
+    /// The three numbers.
+    pub lab: Lab,
+    /// Light of the reading.
+    pub illuminant: Illuminant,
+    /// Observer of the reading.
+    pub observer: Observer,
+}
+
+/// Knee of the cube root, on the `f` axis.
+pub(crate) const KNEE: f64 = 6.0 / 29.0;
+
+fn compress(t: f64) -> f64 {
+    if t > KNEE * KNEE * KNEE { t.cbrt() } else { t / (3.0 * KNEE * KNEE) + 4.0 / 29.0 }
+}
+
+/// Inverse of the CIELAB compression: relative light of one channel from its `f` value.
+pub(crate) fn expand(f: f64) -> f64 {
+    if f > KNEE { f * f * f } else { 3.0 * KNEE * KNEE * (f - 4.0 / 29.0) }
+}
+
+impl Lab {
+    /// Lab of an XYZ color under a white point.
+    #[must_use]
+    pub fn from_xyz(xyz: [f64; 3], white: WhitePoint) -> Self {
+        let [x, y, z] = [compress(xyz[0] / white.x), compress(xyz[1] / white.y), compress(xyz[2] / white.z)];
+        Self { l: 116.0 * y - 16.0, a: 500.0 * (x - y), b: 200.0 * (y - z) }
+    }
+
+    /// XYZ of a Lab color under a white point.
+    #[must_use]
+    pub fn to_xyz(self, white: WhitePoint) -> [f64; 3] {
+        let y = (self.l + 16.0) / 116.0;
+        let (x, z) = (y + self.a / 500.0, y - self.b / 200.0);
+        [white.x * expand(x), white.y * expand(y), white.z * expand(z)]
+    }
+
+    /// Lab of a linear sRGB reflectance factor (`π f` of a BRDF value `f`).
+    #[must_use]
+    pub fn from_rgb(rgb: LinearRgb) -> Self {
+        Self::from_xyz(rgb_to_xyz(rgb), D65_2)
+    }
+
+    /// Linear sRGB reflectance factor of a Lab color.
+    #[must_use]
+    pub fn to_rgb(self) -> LinearRgb {
+        xyz_to_rgb(self.to_xyz(D65_2))
+    }
+
+    /// The three numbers in order.
+    #[must_use]
+    pub const fn to_array(self) -> [f64; 3] {
+        [self.l, self.a, self.b]
+    }
+}
+
+impl From<[f64; 3]> for Lab {
+    fn from([l, a, b]: [f64; 3]) -> Self {
+        Self { l, a, b }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn white_is_one_hundred() {
+        let white = Lab::from_xyz([D65_2.x, 1.0, D65_2.z], D65_2);
+        assert_eq!(white, Lab { l: 100.0, a: 0.0, b: 0.0 });
+    }
+
+    /// sRGB red, worked from the published formulas with 30 digits.
+    #[test]
+    fn red_has_its_published_lab() {
+        let red = Lab::from_rgb([1.0, 0.0, 0.0]);
+        for (x, y) in red.to_array().into_iter().zip([53.240_79, 80.092_46, 67.203_2]) {
+            assert!((x - y).abs() < 5e-3, "{red:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn lab_and_back_keeps_twelve_digits(l in -50.0..1000.0_f64, a in -300.0..300.0_f64, b in -300.0..300.0_f64) {
+            let xyz = Lab { l, a, b }.to_xyz(D65_2);
+            let back = Lab::from_xyz(xyz, D65_2);
+            // f is of order 10 here and a, b multiply its error by 500 and 200.
+            prop_assert!((back.l - l).abs() <= 1e-12 * l.abs().max(100.0));
+            prop_assert!((back.a - a).abs() <= 1e-12 * 500.0 * 10.0);
+            prop_assert!((back.b - b).abs() <= 1e-12 * 200.0 * 10.0);
+        }
+
+        #[test]
+        fn more_light_is_lighter(y in -1.0..100.0_f64) {
+            prop_assert!(compress(y + 1e-6) > compress(y));
+        }
+    }
+}

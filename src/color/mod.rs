@@ -1,0 +1,18 @@
+//! Color: white points, linear sRGB, XYZ, CIELAB and color differences.
+//!
+//! Everything inside carpaint is linear sRGB with the D65 white point of the 2° observer, and CIELAB relative to the
+//! perfect diffuser under that same white. A Lab value that came from elsewhere travels with its illuminant and
+//! observer as a [`ReadingLab`]. Arithmetic is `f64`.
+//!
+//! Left to others: tone mapping and encoding for a screen (`render::film`), spectra (`measurement`).
+
+mod difference;
+mod lab;
+mod rgb;
+mod white;
+
+pub use difference::ciede2000;
+pub(crate) use lab::{KNEE, expand};
+pub use lab::{Lab, ReadingLab};
+pub use rgb::{LinearRgb, luminance, rgb_to_xyz, xyz_to_rgb};
+pub use white::{D65_2, Illuminant, Observer, WhitePoint};

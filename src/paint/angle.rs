@@ -1,0 +1,148 @@
+//! Angle grids: the θh and θd at which a table or a flake slice stands.
+
+use serde::{Deserialize, Serialize};
+
+/// Strictly ascending angles in degrees, at least one, within `0..=90`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
+pub struct AngleGrid {
+    degrees: Vec<f64>,
+}
+
+/// Why a list of numbers is no angle grid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AngleGridError {
+    /// No angle at all.
+    #[error("an angle grid needs at least one angle")]
+    Empty,
+    /// An angle outside `0..=90` or not finite.
+    #[error("angle {index} is {value}°, accepted is 0 to 90")]
+    Range {
+        /// Position in the list.
+        index: usize,
+        /// The offending angle.
+        value: f64,
+    },
+    /// An angle that is not above the one before it.
+    #[error("angle {index} is {value}° after {before}°, angles must ascend strictly")]
+    Order {
+        /// Position in the list.
+        index: usize,
+        /// The offending angle.
+        value: f64,
+        /// The angle before it.
+        before: f64,
+    },
+}
+
+/// Where an angle falls between two grid angles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bracket {
+    /// Index of the angle at or below.
+    pub low: usize,
+    /// Index of the angle above, or `low` at the border.
+    pub high: usize,
+    /// Weight of `high`, in `0..=1`.
+    pub fraction: f64,
+}
+
+impl AngleGrid {
+    /// A grid of these angles in degrees.
+    ///
+    /// # Errors
+    ///
+    /// [`AngleGridError`] for an empty list, an angle outside `0..=90`, or angles that do not ascend strictly.
+    pub fn new(degrees: Vec<f64>) -> Result<Self, AngleGridError> {
+        if degrees.is_empty() {
+            return Err(AngleGridError::Empty);
+        }
+        for (index, &value) in degrees.iter().enumerate() {
+            if !(0.0..=90.0).contains(&value) {
+                return Err(AngleGridError::Range { index, value });
+            }
+            if index > 0 && value <= degrees[index - 1] {
+                return Err(AngleGridError::Order { index, value, before: degrees[index - 1] });
+            }
+        }
+        Ok(Self { degrees })
+    }
+
+    /// The grid with the single angle 0.
+    #[must_use]
+    pub fn single() -> Self {
+        Self { degrees: vec![0.0] }
+    }
+
+    /// The angles, ascending.
+    #[must_use]
+    pub fn degrees(&self) -> &[f64] {
+        &self.degrees
+    }
+
+    /// How many angles, at least one.
+    #[must_use]
+    #[allow(clippy::len_without_is_empty)]
+    pub fn len(&self) -> usize {
+        self.degrees.len()
+    }
+
+    /// Finds an angle in degrees between its neighbours; outside the range the border angle holds.
+    #[must_use]
+    pub fn bracket(&self, angle_deg: f64) -> Bracket {
+        let above = self.degrees.partition_point(|&d| d <= angle_deg);
+        if above == 0 {
+            return Bracket { low: 0, high: 0, fraction: 0.0 };
+        }
+        let low = above - 1;
+        if above == self.degrees.len() {
+            return Bracket { low, high: low, fraction: 0.0 };
+        }
+        let fraction = (angle_deg - self.degrees[low]) / (self.degrees[above] - self.degrees[low]);
+        Bracket { low, high: above, fraction }
+    }
+
+    /// The angles of both grids, each once.
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        let mut degrees: Vec<f64> = self.degrees.iter().chain(&other.degrees).copied().collect();
+        degrees.sort_by(f64::total_cmp);
+        degrees.dedup();
+        Self { degrees }
+    }
+}
+
+impl TryFrom<Vec<f64>> for AngleGrid {
+    type Error = AngleGridError;
+    fn try_from(degrees: Vec<f64>) -> Result<Self, AngleGridError> {
+        Self::new(degrees)
+    }
+}
+
+impl From<AngleGrid> for Vec<f64> {
+    fn from(grid: AngleGrid) -> Self {
+        grid.degrees
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_that_do_not_ascend_are_refused_by_place_and_value() {
+        let error = AngleGrid::new(vec![0.0, 5.0, 5.0]).expect_err("refused");
+        assert_eq!(error, AngleGridError::Order { index: 2, value: 5.0, before: 5.0 });
+        assert!(AngleGrid::new(vec![f64::NAN]).is_err());
+        assert!(AngleGrid::new(vec![0.0, 90.1]).is_err());
+    }
+
+    #[test]
+    fn a_bracket_holds_the_border_outside_the_range() {
+        let grid = AngleGrid::new(vec![10.0, 20.0]).expect("ascending");
+        assert_eq!(grid.bracket(5.0), Bracket { low: 0, high: 0, fraction: 0.0 });
+        assert_eq!(grid.bracket(12.5), Bracket { low: 0, high: 1, fraction: 0.25 });
+        assert_eq!(grid.bracket(20.0), Bracket { low: 1, high: 1, fraction: 0.0 });
+        assert_eq!(grid.bracket(80.0), Bracket { low: 1, high: 1, fraction: 0.0 });
+    }
+}

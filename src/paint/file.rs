@@ -1,0 +1,214 @@
+//! The `.paint` file: a paint with everything known about it, but not the measurement it came from.
+
+use serde::{Deserialize, Serialize};
+
+use super::container::{Container, ContainerError, Writer};
+use super::energy::EnergyCertificate;
+use super::{AngleGrid, CarPaint, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes, Limits, Lobe, PaintError};
+use crate::color::{Lab, LinearRgb};
+
+/// Latest version of the file that is read and the one that is written.
+pub const VERSION: u32 = 1;
+
+/// Where a paint comes from, kept and given back untouched.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// Kind of source: `package`, `rgl`, `mpi-2005`, `merl`, `sample`, `blend`.
+    pub source: String,
+    /// BLAKE3 of the source's bytes, hexadecimal; of a blend, the hashes of its paints.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hashes: Vec<String>,
+    /// Whether the flakes were simulated instead of measured.
+    #[serde(default)]
+    pub simulated_flakes: bool,
+    /// What else the source said about itself: license, instrument, maker, color code, date.
+    #[serde(default, skip_serializing_if = "std::collections::BTreeMap::is_empty")]
+    pub notes: std::collections::BTreeMap<String, String>,
+}
+
+/// How the flakes were clustered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Clustering {
+    /// Most clusters a slice may have.
+    pub clusters: usize,
+    /// Rule that boxes follow: `tight` or `moments`.
+    pub box_rule: String,
+    /// Median and worst distance W1 between a slice's pixels and its clusters, in Lab, where it was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub w1: Option<[f64; 2]>,
+}
+
+/// A paint and what is known about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PaintFile {
+    /// Name, 1 to 200 characters.
+    pub name: String,
+    /// Where it comes from.
+    pub provenance: Provenance,
+    /// The parameters.
+    pub paint: CarPaint,
+    /// How the flakes were clustered, where there are any.
+    pub clustering: Option<Clustering>,
+    /// How well the base fits its measurement, where it was fitted.
+    pub residuals: Option<FitResiduals>,
+    /// Energy certificate.
+    pub energy: EnergyCertificate,
+    /// What the user should know: dirty data, averaged azimuths, energy above 1, clamped values.
+    pub warnings: Vec<String>,
+}
+
+/// Why a file is no paint.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PaintFileError {
+    /// The file as a file.
+    #[error(transparent)]
+    Container(#[from] ContainerError),
+    /// The parameters in it.
+    #[error("the .paint file holds no valid paint: {0}")]
+    Paint(#[from] PaintError),
+}
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    name: String,
+    provenance: Provenance,
+    physical: PhysicalHeader,
+    clustering: Option<Clustering>,
+    residuals: Option<FitResiduals>,
+    energy: EnergyCertificate,
+    warnings: Vec<String>,
+}
+
+/// The parameters of a paint that are not arrays.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct PhysicalHeader {
+    coat: Option<Coat>,
+    diffuse: LinearRgb,
+    lobes: Vec<Lobe>,
+    chi_theta_h_deg: AngleGrid,
+    chi_theta_d_deg: AngleGrid,
+    chi_overall: Lab,
+    flakes: Option<FlakeHeader>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct FlakeHeader {
+    theta_h_deg: AngleGrid,
+    theta_d_deg: AngleGrid,
+    texture: FlakeTexture,
+}
+
+impl PhysicalHeader {
+    pub(crate) fn of(paint: &CarPaint) -> Self {
+        Self {
+            coat: paint.coat,
+            diffuse: paint.diffuse,
+            lobes: paint.lobes.clone(),
+            chi_theta_h_deg: paint.color_table.theta_h().clone(),
+            chi_theta_d_deg: paint.color_table.theta_d().clone(),
+            chi_overall: paint.color_table.overall(),
+            flakes: paint.flakes.as_ref().map(|flakes| FlakeHeader {
+                theta_h_deg: flakes.theta_h.clone(),
+                theta_d_deg: flakes.theta_d.clone(),
+                texture: flakes.texture,
+            }),
+        }
+    }
+}
+
+fn write_arrays(paint: &CarPaint, writer: &mut Writer) {
+    let nodes: Vec<[f64; 3]> = paint.color_table.nodes().iter().map(|lab| lab.to_array()).collect();
+    writer.array(&nodes);
+    if let Some(flakes) = &paint.flakes {
+        writer.array(&flakes.offsets);
+        writer.array(&flakes.probability);
+        writer.array(&flakes.lower);
+        writer.array(&flakes.upper);
+    }
+}
+
+impl CarPaint {
+    /// BLAKE3 of the physical content: equal parameters have equal hashes, whatever the paint is called.
+    ///
+    /// # Panics
+    ///
+    /// Never: plain data serialises.
+    #[must_use]
+    pub fn content_hash(&self) -> blake3::Hash {
+        let mut writer = Writer::default();
+        write_arrays(self, &mut writer);
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&VERSION.to_le_bytes());
+        hasher.update(&serde_json::to_vec(&PhysicalHeader::of(self)).expect("plain data serialises"));
+        hasher.update(writer.body());
+        hasher.finalize()
+    }
+}
+
+impl PaintFile {
+    /// Whether bytes begin like a `.paint` file.
+    #[must_use]
+    pub fn recognises(bytes: &[u8]) -> bool {
+        Container::is(bytes, "paint")
+    }
+
+    /// The bytes of the file.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut writer = Writer::default();
+        write_arrays(&self.paint, &mut writer);
+        let header = Header {
+            name: self.name.clone(),
+            provenance: self.provenance.clone(),
+            physical: PhysicalHeader::of(&self.paint),
+            clustering: self.clustering.clone(),
+            residuals: self.residuals.clone(),
+            energy: self.energy.clone(),
+            warnings: self.warnings.clone(),
+        };
+        writer.finish("paint", VERSION, &header)
+    }
+
+    /// Reads a file and validates the paint in it.
+    ///
+    /// # Errors
+    ///
+    /// [`PaintFileError`] for another kind of file, a newer version, a damaged file, or parameters out of range.
+    pub fn from_bytes(bytes: &[u8], limits: &Limits) -> Result<Self, PaintFileError> {
+        let container = Container::open(bytes, "paint", VERSION)?;
+        let header: Header = container.header()?;
+        let mut reader = container.reader();
+        let physical = header.physical;
+        let nodes = reader.array::<[f64; 3]>()?.into_iter().map(Lab::from).collect();
+        let color_table =
+            ColorTable::new(physical.chi_theta_h_deg, physical.chi_theta_d_deg, nodes, physical.chi_overall)
+                .map_err(PaintError::from)?;
+        let flakes = match physical.flakes {
+            None => None,
+            Some(flakes) => Some(Flakes {
+                theta_h: flakes.theta_h_deg,
+                theta_d: flakes.theta_d_deg,
+                offsets: reader.array()?,
+                probability: reader.array()?,
+                lower: reader.array()?,
+                upper: reader.array()?,
+                texture: flakes.texture,
+            }),
+        };
+        let (coat, diffuse, lobes) = (physical.coat, physical.diffuse, physical.lobes);
+        let paint = CarPaint { coat, diffuse, lobes, color_table, flakes };
+        paint.validate(limits)?;
+        Ok(Self {
+            name: header.name,
+            provenance: header.provenance,
+            paint,
+            clustering: header.clustering,
+            residuals: header.residuals,
+            energy: header.energy,
+            warnings: header.warnings,
+        })
+    }
+}

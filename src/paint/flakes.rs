@@ -1,0 +1,121 @@
+//! Flakes as statistics: color clusters per angle pair, and how the random texture spends them.
+//!
+//! One slice per (θh, θd) holds clusters: boxes in CIELAB of π f with a probability each, colors uniform inside
+//! (Golla and Klein 2018, 3.2). Within a slice clusters ascend in lightness as fitted, so that one random number kept
+//! over neighbouring slices is one flake that brightens and fades.
+
+use serde::{Deserialize, Serialize};
+
+use super::angle::AngleGrid;
+use super::box_color::mean_color;
+use crate::color::LinearRgb;
+
+/// The flakes of a paint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flakes {
+    /// Half angles of the slices.
+    pub theta_h: AngleGrid,
+    /// Difference angles of the slices.
+    pub theta_d: AngleGrid,
+    /// First cluster of each slice, θd fastest, and one past the last: `theta_h.len() * theta_d.len() + 1` numbers.
+    pub offsets: Vec<u32>,
+    /// Probability of each cluster; sums to 1 in every slice.
+    pub probability: Vec<f64>,
+    /// Corner of smallest L, a, b of each box.
+    pub lower: Vec<[f32; 3]>,
+    /// Corner of largest L, a, b of each box.
+    pub upper: Vec<[f32; 3]>,
+    /// Size and persistence of the flakes.
+    pub texture: FlakeTexture,
+}
+
+/// What a histogram does not say: how large a flake is and how long it shines.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FlakeTexture {
+    /// Side of a texel on the paint, micrometres.
+    pub texel_um: f64,
+    /// Distance over which the texels' autocorrelation falls to one half, micrometres.
+    pub grain_um: f64,
+    /// Angle over which a slice's correlation with its neighbours falls to one half, degrees, along θh and θd.
+    pub lifetime_deg: [f64; 2],
+    /// Angle over which a texel keeps its random number, degrees, along θh and θd: what gives the lifetime.
+    pub persistence_deg: [f64; 2],
+}
+
+/// The clusters of one angle pair.
+#[derive(Clone, Copy, Debug)]
+pub struct Slice<'a> {
+    /// Probability of each cluster.
+    pub probability: &'a [f64],
+    /// Lower corners in Lab.
+    pub lower: &'a [[f32; 3]],
+    /// Upper corners in Lab.
+    pub upper: &'a [[f32; 3]],
+}
+
+impl Flakes {
+    /// The slice at these grid indices.
+    ///
+    /// # Panics
+    ///
+    /// When an index is outside the grid.
+    #[must_use]
+    pub fn slice(&self, theta_h: usize, theta_d: usize) -> Slice<'_> {
+        self.slice_at(theta_h * self.theta_d.len() + theta_d)
+    }
+
+    /// Slice `k` in storage order, θd fastest.
+    ///
+    /// # Panics
+    ///
+    /// When `k` is no slice.
+    #[must_use]
+    pub fn slice_at(&self, k: usize) -> Slice<'_> {
+        let range = self.offsets[k] as usize..self.offsets[k + 1] as usize;
+        Slice {
+            probability: &self.probability[range.clone()],
+            lower: &self.lower[range.clone()],
+            upper: &self.upper[range],
+        }
+    }
+
+    /// How many slices.
+    #[must_use]
+    pub fn slices(&self) -> usize {
+        self.theta_h.len() * self.theta_d.len()
+    }
+
+    /// How many clusters in all slices.
+    #[must_use]
+    pub fn clusters(&self) -> usize {
+        self.probability.len()
+    }
+
+    /// The most clusters any slice has.
+    #[must_use]
+    pub fn widest_slice(&self) -> usize {
+        self.offsets.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)
+    }
+}
+
+impl Slice<'_> {
+    /// Mean flake reflectance of the slice in 1/sr, in closed form; may be slightly negative where the sensor was.
+    #[must_use]
+    pub fn mean(&self) -> LinearRgb {
+        let mut sum = [0.0; 3];
+        for ((p, &lower), &upper) in self.probability.iter().zip(self.lower).zip(self.upper) {
+            let color = mean_color(lower, upper);
+            for k in 0..3 {
+                sum[k] += p * color[k];
+            }
+        }
+        sum.map(|s| s / std::f64::consts::PI)
+    }
+
+    /// Middle of a box in Lab.
+    #[must_use]
+    pub fn center(&self, cluster: usize) -> [f64; 3] {
+        let (lower, upper) = (self.lower[cluster], self.upper[cluster]);
+        std::array::from_fn(|k| f64::midpoint(f64::from(lower[k]), f64::from(upper[k])))
+    }
+}

@@ -1,0 +1,40 @@
+//! Limits on everything untrusted, handed to every parser and renderer.
+
+/// How much of anything is accepted. The default suits a service that strangers upload to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of an upload, and of what it unpacks to.
+    pub bytes: u64,
+    /// Pixels of one picture.
+    pub pixels: u64,
+    /// Entries of an archive.
+    pub entries: usize,
+    /// Angles of one axis of a grid.
+    pub angles: usize,
+    /// Lobes of a paint.
+    pub lobes: usize,
+    /// Paints in one blend.
+    pub paints: usize,
+    /// Clusters in one slice of a stored paint.
+    pub clusters: usize,
+    /// Samples per pixel of a preview.
+    pub samples: u32,
+    /// Direction pairs of one evaluation.
+    pub pairs: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            bytes: 4 << 30,
+            pixels: 64 << 20,
+            entries: 20_000,
+            angles: 181,
+            lobes: 8,
+            paints: 5,
+            clusters: 4096,
+            samples: 4096,
+            pairs: 4_000_000,
+        }
+    }
+}

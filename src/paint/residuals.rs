@@ -1,0 +1,42 @@
+//! What is kept of a fit: how far the paint is from its measurement, and how near anything of its form could come.
+
+use serde::{Deserialize, Serialize};
+
+/// Residuals of a fitted base, with the floor: what a free function of (θh, θd) reaches on the same measurement.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FitResiduals {
+    /// Relative root mean square error of luminance over all samples.
+    pub relative_rmse: f64,
+    /// Relative luminance error with θh of 5° and more, directions within 70° of the normal.
+    pub all: LuminanceError,
+    /// The same with θh below 5°, next to the mirror direction.
+    pub near_mirror: LuminanceError,
+    /// CIEDE2000 at the six instrument geometries.
+    pub instrument: Vec<InstrumentError>,
+    /// Share of the table's entries that were invalid, 0 to 1.
+    pub invalid_share: f64,
+}
+
+/// Percentiles of the relative luminance error.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LuminanceError {
+    /// Median of the fit.
+    pub median: f64,
+    /// 90th percentile of the fit.
+    pub p90: f64,
+    /// Median of the floor.
+    pub floor_median: f64,
+    /// 90th percentile of the floor.
+    pub floor_p90: f64,
+}
+
+/// Color error at one instrument geometry.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InstrumentError {
+    /// Aspecular angle, degrees.
+    pub aspecular_deg: f64,
+    /// CIEDE2000 of the fit.
+    pub fit: f64,
+    /// CIEDE2000 of the floor.
+    pub floor: f64,
+}

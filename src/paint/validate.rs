@@ -1,0 +1,172 @@
+//! What makes a paint valid, and the bounds a synthesised one is held to.
+
+use super::angle::AngleGridError;
+use super::color_table::ColorTableError;
+use super::{CarPaint, Coat, Flakes, Limits, Lobe};
+
+/// Least roughness a lobe is evaluated with.
+pub const MIN_ALPHA: f64 = 1e-4;
+/// Largest roughness of a lobe.
+pub const MAX_ALPHA: f64 = 10.0;
+/// Largest weight of a lobe.
+pub const MAX_WEIGHT: f64 = 1e3;
+/// Largest magnitude of L, a or b of a box or a table color.
+pub const MAX_LAB: f64 = 2000.0;
+
+/// Why parameters are no paint. Names the field as a path, the value, and what is accepted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PaintError {
+    /// A number outside its range, or not finite.
+    #[error("{field} is {value}, accepted is {accepted}")]
+    Range {
+        /// Path of the field.
+        field: String,
+        /// The offending value.
+        value: f64,
+        /// What would be accepted.
+        accepted: &'static str,
+    },
+    /// More of something than is accepted.
+    #[error("{field} has {count} entries, accepted are {accepted}")]
+    Count {
+        /// Path of the field.
+        field: String,
+        /// How many there are.
+        count: usize,
+        /// What would be accepted.
+        accepted: String,
+    },
+    /// Lists that belong together differ in length.
+    #[error("{field}: {reason}")]
+    Shape {
+        /// Path of the field.
+        field: String,
+        /// What does not fit.
+        reason: String,
+    },
+    /// An angle grid is not one.
+    #[error("{field}: {source}")]
+    Angles {
+        /// Path of the field.
+        field: String,
+        /// What is wrong with it.
+        source: AngleGridError,
+    },
+    /// The color table is not one.
+    #[error("color_table: {0}")]
+    ColorTable(#[from] ColorTableError),
+}
+
+fn within(
+    field: impl FnOnce() -> String,
+    value: f64,
+    low: f64,
+    high: f64,
+    accepted: &'static str,
+) -> Result<(), PaintError> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    Err(PaintError::Range { field: field(), value, accepted })
+}
+
+impl CarPaint {
+    /// Checks every number and every length.
+    ///
+    /// # Errors
+    ///
+    /// [`PaintError`] for the first field that is out of range, with its path.
+    pub fn validate(&self, limits: &Limits) -> Result<(), PaintError> {
+        if let Some(coat) = &self.coat {
+            coat.validate()?;
+        }
+        for (channel, &value) in self.diffuse.iter().enumerate() {
+            within(|| format!("diffuse[{channel}]"), value, 0.0, MAX_WEIGHT, "0 to 1000")?;
+        }
+        if self.lobes.len() > limits.lobes {
+            let accepted = format!("0 to {}", limits.lobes);
+            return Err(PaintError::Count { field: "lobes".into(), count: self.lobes.len(), accepted });
+        }
+        for (k, lobe) in self.lobes.iter().enumerate() {
+            lobe.validate(k)?;
+        }
+        for (k, lab) in self.color_table.nodes().iter().enumerate() {
+            for value in lab.to_array() {
+                within(|| format!("color_table[{k}]"), value, -MAX_LAB, MAX_LAB, "-2000 to 2000")?;
+            }
+        }
+        self.flakes.as_ref().map_or(Ok(()), |flakes| flakes.validate(limits))
+    }
+}
+
+impl Coat {
+    fn validate(&self) -> Result<(), PaintError> {
+        within(|| "coat.ior".into(), self.ior, 1.0, 4.0, "1 to 4")?;
+        within(|| "coat.roughness".into(), self.roughness, 0.0, 1.0, "0 to 1")?;
+        let thickness = self.thickness_um.unwrap_or(1.0);
+        within(|| "coat.thickness_um".into(), thickness, 0.0, 1e6, "0 to 1000000")
+    }
+}
+
+impl Lobe {
+    fn validate(&self, k: usize) -> Result<(), PaintError> {
+        for (channel, &value) in self.weight.iter().enumerate() {
+            within(|| format!("lobes[{k}].weight[{channel}]"), value, 0.0, MAX_WEIGHT, "0 to 1000")?;
+        }
+        within(|| format!("lobes[{k}].alpha"), self.alpha, f64::MIN_POSITIVE, MAX_ALPHA, "above 0, to 10")?;
+        within(|| format!("lobes[{k}].f0"), self.f0, 0.0, 1.0, "0 to 1")
+    }
+}
+
+impl Flakes {
+    fn validate(&self, limits: &Limits) -> Result<(), PaintError> {
+        let shape = |field: &str, reason: String| Err(PaintError::Shape { field: field.into(), reason });
+        if self.offsets.len() != self.slices() + 1 {
+            return shape("flakes.offsets", format!("{} offsets for {} slices", self.offsets.len(), self.slices()));
+        }
+        let clusters = self.offsets.last().map_or(0, |&last| last as usize);
+        let lengths = [self.probability.len(), self.lower.len(), self.upper.len()];
+        if lengths != [clusters; 3] || self.offsets[0] != 0 {
+            return shape("flakes.clusters", format!("offsets name {clusters} clusters, the lists hold {lengths:?}"));
+        }
+        for (k, pair) in self.offsets.windows(2).enumerate() {
+            let count = (pair[1] as usize).saturating_sub(pair[0] as usize);
+            if pair[1] <= pair[0] || count > limits.clusters {
+                let accepted = format!("1 to {}", limits.clusters);
+                return Err(PaintError::Count { field: format!("flakes.slices[{k}]"), count, accepted });
+            }
+            self.validate_slice(k, count)?;
+        }
+        let t = &self.texture;
+        within(|| "flakes.texel_um".into(), t.texel_um, f64::MIN_POSITIVE, 1e5, "above 0, to 100000")?;
+        within(|| "flakes.grain_um".into(), t.grain_um, f64::MIN_POSITIVE, 1e6, "above 0, to 1000000")?;
+        for angle in t.lifetime_deg.iter().chain(&t.persistence_deg) {
+            within(|| "flakes.lifetime_deg".into(), *angle, f64::MIN_POSITIVE, 1e4, "above 0, to 10000")?;
+        }
+        Ok(())
+    }
+
+    fn validate_slice(&self, k: usize, count: usize) -> Result<(), PaintError> {
+        let slice = self.slice_at(k);
+        let mut sum = 0.0;
+        for (c, &p) in slice.probability.iter().enumerate() {
+            within(|| format!("flakes.slices[{k}].probability[{c}]"), p, 0.0, 1.0, "0 to 1")?;
+            sum += p;
+        }
+        #[allow(clippy::cast_precision_loss)] // at most a few thousand
+        let rounding = 1e-12 * count as f64;
+        if (sum - 1.0).abs() > rounding {
+            let field = format!("flakes.slices[{k}].probability");
+            return Err(PaintError::Range { field, value: sum, accepted: "probabilities that sum to 1" });
+        }
+        for (c, (lower, upper)) in slice.lower.iter().zip(slice.upper).enumerate() {
+            for axis in 0..3 {
+                let field = || format!("flakes.slices[{k}].box[{c}][{axis}]");
+                within(field, f64::from(lower[axis]), -MAX_LAB, MAX_LAB, "-2000 to 2000")?;
+                within(field, f64::from(upper[axis]), f64::from(lower[axis]), MAX_LAB, "the lower corner to 2000")?;
+            }
+        }
+        Ok(())
+    }
+}
