@@ -8,6 +8,7 @@
 //!                              transport             └────────▶ render ─▶ PNG, EXR
 //! ```
 
+pub mod blend;
 pub mod color;
 pub mod paint;
 pub mod transport;
