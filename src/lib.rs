@@ -10,5 +10,6 @@
 
 pub mod blend;
 pub mod color;
+pub mod measurement;
 pub mod paint;
 pub mod transport;
