@@ -13,3 +13,4 @@ pub mod color;
 pub mod measurement;
 pub mod paint;
 pub mod transport;
+pub mod render;
