@@ -52,7 +52,7 @@ impl EffectPlan {
     /// Looks at scene and paint.
     #[must_use]
     pub fn new(paint: &CarPaint, scene: &Scene, lit_by_environment: bool) -> Self {
-        let coat = paint.coat.filter(|coat| coat.ior >= Coat::MIN_IOR);
+        let coat = paint.coat.filter(|coat| coat.ior > 1.0);
         let lobes = paint.lobes.iter().filter(|lobe| !lobe.is_absent()).count();
         let table = paint.color_table.nodes().len();
         let sweep = scene.background == super::Background::Sweep;

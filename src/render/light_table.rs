@@ -8,7 +8,7 @@
 use std::f32::consts::{PI, TAU};
 
 use super::environment::{Environment, Map, Source, luminance};
-use super::vector::{Vec3, scale};
+use super::vector::Vec3;
 
 /// One drawn direction.
 #[derive(Clone, Copy, Debug)]
