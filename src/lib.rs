@@ -9,4 +9,6 @@
 //! ```
 
 pub mod color;
+pub mod fit;
+pub mod measurement;
 pub mod paint;
