@@ -10,7 +10,8 @@
 
 pub mod blend;
 pub mod color;
+pub mod fit;
 pub mod measurement;
 pub mod paint;
-pub mod transport;
 pub mod render;
+pub mod transport;

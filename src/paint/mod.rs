@@ -28,7 +28,7 @@ mod validate;
 
 pub(crate) use angle::{QuickBracket, QuickGrid};
 pub use angle::{AngleGrid, AngleGridError, Bracket};
-pub use box_color::mean_color;
+pub use box_color::{center_of_mean, mean_color};
 pub use coat::{Coat, fresnel, refract};
 pub use color_table::{ColorTable, ColorTableError};
 pub use container::{Container, ContainerError, Reader, Writer};
