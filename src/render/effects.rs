@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::scene::Scene;
-use crate::paint::{CarPaint, Coat};
+use crate::paint::CarPaint;
 
 /// Something that can be seen in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
