@@ -9,4 +9,5 @@
 //! ```
 
 pub mod color;
+pub mod export;
 pub mod paint;
