@@ -40,19 +40,8 @@ impl Solver for TransportSimplex {
     ) -> Result<(), TransportError> {
         problem.check_filled()?;
         workspace.prepare(problem, cost);
-        let Workspace {
-            matrix,
-            units,
-            start,
-            simplex,
-            ..
-        } = workspace;
-        let job = Job {
-            problem,
-            matrix,
-            units,
-            cost,
-        };
+        let Workspace { matrix, units, start, simplex, .. } = workspace;
+        let job = Job { problem, matrix, units, cost };
         let points = problem.source().len().max(problem.target().len());
         let scratch = &mut simplex.scratch;
         let solved = match points {
@@ -107,11 +96,7 @@ impl Job<'_> {
     ) -> bool {
         let matrix = self.matrix;
         let (sources, targets) = (self.units.supplies.len(), self.units.demands.len());
-        let Scratch {
-            source_values,
-            target_values,
-            allowed,
-        } = scratch;
+        let Scratch { source_values, target_values, allowed } = scratch;
         greedy_start(matrix, self.units, start);
         tree.plant(sources, targets, &start.steps);
         source_values.clear();
@@ -125,14 +110,7 @@ impl Job<'_> {
         let cost = |source, target| matrix.at(source, target);
         tree.potentials(cost, source_values, target_values.as_flattened_mut());
         loop {
-            if !pivot_until_priced(
-                tree,
-                matrix,
-                tolerance,
-                &mut pivots_left,
-                source_values,
-                target_values,
-            ) {
+            if !pivot_until_priced(tree, matrix, tolerance, &mut pivots_left, source_values, target_values) {
                 return false;
             }
             tree.potentials(cost, source_values, target_values.as_flattened_mut());
@@ -145,12 +123,7 @@ impl Job<'_> {
         plan.restart();
         tree.for_each_edge(|source, target, grains| plan.push(self.units, source, target, grains));
         plan.price(self.problem, self.cost);
-        plan.offer(
-            self.problem,
-            self.cost,
-            source_values,
-            allowed.as_flattened(),
-        );
+        plan.offer(self.problem, self.cost, source_values, allowed.as_flattened());
         true
     }
 }

@@ -38,11 +38,7 @@ pub(super) fn row_minimum(row: &[[f64; LANES]], values: &[[f64; LANES]]) -> f64 
     for (costs, values) in row.iter().zip(values) {
         for lane in 0..LANES {
             let reduced = costs[lane] - values[lane];
-            least[lane] = if reduced < least[lane] {
-                reduced
-            } else {
-                least[lane]
-            };
+            least[lane] = if reduced < least[lane] { reduced } else { least[lane] };
         }
     }
     let mut smallest = least[0];
@@ -79,12 +75,7 @@ pub(super) struct StartMemory {
 
 impl StartMemory {
     /// Potentials under which all steps' pairs are tight.
-    pub(super) fn tree_duals(
-        &self,
-        matrix: &CostMatrix,
-        source_duals: &mut [f64],
-        target_duals: &mut [[f64; LANES]],
-    ) {
+    pub(super) fn tree_duals(&self, matrix: &CostMatrix, source_duals: &mut [f64], target_duals: &mut [[f64; LANES]]) {
         let target_duals = target_duals.as_flattened_mut();
         for (k, &step) in self.steps.iter().rev().enumerate() {
             match step {
@@ -105,24 +96,8 @@ impl StartMemory {
 /// The steps as flows, in their order.
 pub(super) fn steps_as_flows(steps: &[Closing]) -> impl Iterator<Item = Flow> + '_ {
     steps.iter().map(|&step| match step {
-        Closing::Source {
-            closed,
-            parent,
-            grains,
-        } => Flow {
-            source: closed,
-            target: parent,
-            grains,
-        },
-        Closing::Target {
-            closed,
-            parent,
-            grains,
-        } => Flow {
-            source: parent,
-            target: closed,
-            grains,
-        },
+        Closing::Source { closed, parent, grains } => Flow { source: closed, target: parent, grains },
+        Closing::Target { closed, parent, grains } => Flow { source: parent, target: closed, grains },
     })
 }
 
@@ -147,11 +122,7 @@ pub(super) fn mean_costs(matrix: &CostMatrix, targets: usize, means: &mut [[f64;
 
 /// Lists the steps of the start.
 pub(super) fn greedy_start(matrix: &CostMatrix, units: &Units, memory: &mut StartMemory) {
-    let StartMemory {
-        steps,
-        values,
-        left,
-    } = memory;
+    let StartMemory { steps, values, left } = memory;
     let sources = units.supplies.len();
     values.clear();
     values.resize(matrix.stride(), [0.0; LANES]);
@@ -169,21 +140,13 @@ pub(super) fn greedy_start(matrix: &CostMatrix, units: &Units, memory: &mut Star
             // One target stays open to the end: it is the root, and takes what is left.
             if open == 1 || supply < demand && source + 1 < sources {
                 left[target] = demand - supply;
-                steps.push(Closing::Source {
-                    closed: source,
-                    parent: target,
-                    grains: supply,
-                });
+                steps.push(Closing::Source { closed: source, parent: target, grains: supply });
                 break;
             }
             supply -= demand;
             open -= 1;
             values.as_flattened_mut()[target] = f64::NEG_INFINITY;
-            steps.push(Closing::Target {
-                closed: target,
-                parent: source,
-                grains: demand,
-            });
+            steps.push(Closing::Target { closed: target, parent: source, grains: demand });
         }
     }
 }

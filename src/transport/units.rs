@@ -11,6 +11,12 @@
 //! marginals hold to a few units absolutely (1e-15 for hundreds of points); for everything but a light source feeding a
 //! light target they hold relatively too.
 
+#![expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    reason = "counts of units lie below 2^62, and what their 53 leading bits miss is far below a mass's own rounding"
+)]
+
 use super::problem::{Cloud, Problem};
 
 /// A source with fewer units than this is scaled by its own mass, since rounding moved it noticeably.
@@ -41,26 +47,15 @@ impl Units {
         count(problem.source(), sum_bits, &mut self.supplies);
         count(problem.target(), sum_bits, &mut self.demands);
         self.source_mass.clear();
-        self.source_mass
-            .extend(
-                self.supplies
-                    .iter()
-                    .zip(problem.source().masses())
-                    .map(|(&units, &mass)| {
-                        if units < LIGHT {
-                            mass / units as f64
-                        } else {
-                            0.0
-                        }
-                    }),
-            );
-        self.target_mass.clear();
-        self.target_mass.extend(
-            self.demands
+        self.source_mass.extend(
+            self.supplies
                 .iter()
-                .zip(problem.target().masses())
-                .map(|(&units, &mass)| mass / units as f64),
+                .zip(problem.source().masses())
+                .map(|(&units, &mass)| if units < LIGHT { mass / units as f64 } else { 0.0 }),
         );
+        self.target_mass.clear();
+        self.target_mass
+            .extend(self.demands.iter().zip(problem.target().masses()).map(|(&units, &mass)| mass / units as f64));
         for supply in &mut self.supplies {
             *supply = (*supply << self.shift) + 1;
         }
@@ -79,11 +74,7 @@ impl Units {
             return None;
         }
         let own = self.source_mass[source];
-        let per_unit = if own > 0.0 {
-            own
-        } else {
-            self.target_mass[target]
-        };
+        let per_unit = if own > 0.0 { own } else { self.target_mass[target] };
         Some((units as f64 * per_unit).max(f64::MIN_POSITIVE))
     }
 }
@@ -112,13 +103,8 @@ mod tests {
 
     fn units(source: &[f64], target: &[f64]) -> Units {
         let points = vec![[0.0; 3]; source.len().max(target.len())];
-        let problem = Problem::new(
-            &points[..source.len()],
-            source,
-            &points[..target.len()],
-            target,
-        )
-        .expect("positive masses");
+        let problem =
+            Problem::new(&points[..source.len()], source, &points[..target.len()], target).expect("positive masses");
         let mut units = Units::default();
         units.fill(&problem);
         units
@@ -127,10 +113,7 @@ mod tests {
     #[test]
     fn both_sides_hold_the_same_number_of_grains() {
         let units = units(&[0.1; 7], &[1e-300, 0.3, 0.7, 1e-20]);
-        assert_eq!(
-            units.supplies.iter().sum::<i64>(),
-            units.demands.iter().sum::<i64>()
-        );
+        assert_eq!(units.supplies.iter().sum::<i64>(), units.demands.iter().sum::<i64>());
         assert!(units.supplies.iter().chain(&units.demands).all(|&n| n > 0));
     }
 
@@ -139,16 +122,9 @@ mod tests {
         let units = units(&[0.25; 4], &[0.25; 4]);
         for sources in 1_u32..15 {
             for targets in 1_u32..15 {
-                let part = |grains: &[i64], set: u32| -> i64 {
-                    (0..4)
-                        .filter(|i| set >> i & 1 == 1)
-                        .map(|i| grains[i])
-                        .sum()
-                };
-                assert_ne!(
-                    part(&units.supplies, sources),
-                    part(&units.demands, targets)
-                );
+                let part =
+                    |grains: &[i64], set: u32| -> i64 { (0..4).filter(|i| set >> i & 1 == 1).map(|i| grains[i]).sum() };
+                assert_ne!(part(&units.supplies, sources), part(&units.demands, targets));
             }
         }
     }
