@@ -4,7 +4,6 @@
 //!   what `good_lp` finds, wherever `good_lp`'s own marginals hold to 1e-9. How often it failed is printed.
 //! - Many random problems meant to break a solver, each judged by its dual certificate, whose terms are recomputed here
 //!   from points and masses alone. `CARPAINT_FUZZ` says how many.
-//! - The original generator, where it and Python are at hand; otherwise the test says that it skips.
 //!
 //! Tolerances. Costs are sums of at most 99 products, rounded to a few 1e-16 relatively; the tie-break may cost 5e-10 of
 //! the optimum. Duals are sums of costs along a tree way, each step rounding by at most 1.1e-16 of the largest potential;
