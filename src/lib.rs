@@ -10,6 +10,7 @@
 
 pub mod blend;
 pub mod color;
+pub mod fit;
 pub mod measurement;
 pub mod paint;
 pub mod transport;

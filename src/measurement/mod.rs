@@ -17,6 +17,7 @@ mod tensor;
 pub use merl::read_merl;
 pub use mpi::{MPI_HEADER_BYTES, read_mpi};
 pub use rgl::{RglError, RglMeasurement};
+pub(crate) use table::half_frame_pair;
 pub use table::{HalfAngleTable, TableError, ThetaHSpacing};
 pub use tensor::TensorError;
 
