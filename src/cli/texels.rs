@@ -49,15 +49,13 @@ impl Texels {
         }
         let options = ReadingArgs::default().options(None, &self.profile)?;
         let thing = open(&self.input, &options, &|_| ())?;
-        let realised = thing.realise(|blend| {
-            self.weights.for_blend(blend.ingredients().map(|(name, _)| name)).map(Some)
-        });
-        let realised = match realised {
-            Ok(realised) => realised,
-            Err(error) => return Err(error),
-        };
-        let bytes =
-            texels(&realised.paint, [self.theta_h, self.theta_d], [self.size.width, self.size.height], self.seed)?;
+        if matches!(thing, Thing::Paint(_)) {
+            refuse_weights(&self.weights)?;
+        }
+        let realised =
+            thing.realise(|blend| self.weights.for_blend(blend.ingredients().map(|(name, _)| name)).map(Some))?;
+        let (angles, size) = ([self.theta_h, self.theta_d], [self.size.width, self.size.height]);
+        let bytes = texels(&realised.paint, angles, size, self.seed, &options.limits)?;
         output::replace(&self.out, &bytes)?;
         if json {
             return output::print_json(&json!({ "out": self.out, "bytes": bytes.len() }));

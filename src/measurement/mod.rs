@@ -26,6 +26,7 @@ pub use package::{
 };
 pub use picture::{Picture, PictureError, PictureScratch};
 pub use rgl::{RglError, RglMeasurement};
+pub(crate) use table::half_frame_pair;
 pub use table::{HalfAngleTable, TableError, ThetaHSpacing};
 pub use tensor::TensorError;
 

@@ -102,6 +102,12 @@ fn refused(error: RenderError) -> WorkshopError {
 /// # Errors
 ///
 /// [`WorkshopError`] for a paint without flakes or a picture too large.
-pub fn texels(paint: &CarPaint, theta_deg: [f64; 2], size: [u32; 2], seed: u32) -> Result<Vec<u8>, WorkshopError> {
-    render::texels(paint, theta_deg[0], theta_deg[1], size[0], size[1], seed).map_err(refused)
+pub fn texels(
+    paint: &CarPaint,
+    theta_deg: [f64; 2],
+    size: [u32; 2],
+    seed: u32,
+    limits: &Limits,
+) -> Result<Vec<u8>, WorkshopError> {
+    render::texels(paint, theta_deg[0], theta_deg[1], size, seed, limits).map_err(refused)
 }
