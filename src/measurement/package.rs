@@ -9,6 +9,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use bytes::Bytes;
+use rayon::prelude::*;
 
 use super::archive::Archive;
 use super::manifest::{BaseEntry, FlakesEntry, MANIFEST, Manifest, TableEntry};
@@ -301,6 +302,34 @@ fn overall_color(theta_h: &AngleGrid, theta_d: &AngleGrid, nodes: &[Lab]) -> Lab
         }
     }
     Lab::from_rgb(sum.map(|s| s / weight))
+}
+
+impl FlakeSlices {
+    /// Mean color of the finite texels of every slice, 1/sr, θd fastest.
+    ///
+    /// # Errors
+    ///
+    /// [`PackageError`] for the first slice that is missing, damaged or of the wrong size.
+    pub fn mean_colors(&self) -> Result<Vec<LinearRgb>, PackageError> {
+        (0..self.slices())
+            .into_par_iter()
+            .map_init(SliceRoom::default, |room, k| {
+                self.read(k, room)?;
+                let mut sum = [0.0; 3];
+                let mut count = 0.0;
+                for texel in 0..room.picture.pixels() {
+                    let color = room.picture.planes.each_ref().map(|plane| f64::from(plane[texel]));
+                    if color.iter().all(|v| v.is_finite()) {
+                        count += 1.0;
+                        for k in 0..3 {
+                            sum[k] += color[k];
+                        }
+                    }
+                }
+                Ok(sum.map(|s| s / f64::max(count, 1.0)))
+            })
+            .collect()
+    }
 }
 
 impl FlakePictures for FlakeSlices {

@@ -7,6 +7,7 @@
 //!
 //! The numbers come from 32-bit integer hashing and the tile has no seam; a shader reads them from a texture.
 
+use super::flakes::FlakeTexture;
 use super::sparkle::{mix, unit};
 
 /// A tile of cell numbers that repeats over the paint.
@@ -18,6 +19,15 @@ pub struct RandomTexture {
 }
 
 impl RandomTexture {
+    /// Texels along a side of the tile that pictures and bundles share.
+    pub const TILE: u32 = 256;
+
+    /// The tile of these flakes: the one that pictures draw and bundles carry.
+    #[must_use]
+    pub fn of(texture: &FlakeTexture) -> Self {
+        Self::new(Self::TILE, Self::TILE, cell_spacing(texture.grain_um / texture.texel_um), 1)
+    }
+
     /// A tile of `width x height` texels whose cells are `spacing` texels apart (see [`cell_spacing`]).
     ///
     /// Sizes are at least 1; the same arguments give the same tile on every machine.
