@@ -10,3 +10,4 @@
 
 pub mod color;
 pub mod paint;
+pub mod store;
