@@ -8,6 +8,11 @@
 //!                              transport             └────────▶ render ─▶ PNG, EXR
 //! ```
 
+pub mod blend;
 pub mod color;
+pub mod measurement;
 pub mod paint;
+pub mod render;
+pub mod service;
 pub mod store;
+pub mod transport;

@@ -26,6 +26,7 @@ mod residuals;
 mod sparkle;
 mod validate;
 
+pub(crate) use angle::{QuickBracket, QuickGrid};
 pub use angle::{AngleGrid, AngleGridError, Bracket};
 pub use box_color::mean_color;
 pub use coat::{Coat, fresnel, refract};

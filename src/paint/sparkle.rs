@@ -10,8 +10,9 @@
 //! All of it is 32-bit integer arithmetic, so that a shader draws the very same flakes. The mixing step is
 //! PCG-RXS-M-XS (M. O'Neill, 2014). Hash by the texel on the paint, never by the pixel or the frame.
 
+use super::angle::QuickGrid;
 use super::flakes::{FlakeTexture, Flakes};
-use crate::color::Lab;
+use crate::color::{D65_2, expand_f32, xyz_to_rgb};
 
 /// One step of the permuted congruential generator: every bit of the answer depends on every bit of `x`.
 #[must_use]
@@ -175,27 +176,57 @@ impl TexelDraw {
     }
 }
 
-/// Flakes prepared for drawing: cumulative probabilities per slice.
+/// Flakes prepared for drawing: cumulative probabilities, boxes along the axes of the cube roots, angles to look up.
 #[derive(Clone, Debug)]
 pub struct FlakeSampler<'a> {
     flakes: &'a Flakes,
+    theta_h: QuickGrid,
+    theta_d: QuickGrid,
+    persistence: [f32; 2],
     cumulative: Vec<f32>,
+    boxes: Vec<RootBox>,
+    /// Linear sRGB in 1/sr of the three expanded roots.
+    to_rgb: [[f32; 3]; 3],
 }
+
+/// A box in `fy`, `a/500`, `b/200`: the smallest corner, and the way to the largest.
+#[derive(Clone, Copy, Debug)]
+struct RootBox {
+    lower: [f32; 3],
+    extent: [f32; 3],
+}
+
+/// Clusters up to which counting beats bisection.
+const COUNTED: usize = 96;
 
 impl<'a> FlakeSampler<'a> {
     /// Prepares flakes: one pass over the clusters.
     #[must_use]
+    #[allow(clippy::cast_possible_truncation)] // texel precision is f32
     pub fn new(flakes: &'a Flakes) -> Self {
         let mut cumulative = Vec::with_capacity(flakes.clusters());
         for k in 0..flakes.slices() {
             let mut sum = 0.0;
-            #[allow(clippy::cast_possible_truncation)] // a probability at texel precision
             cumulative.extend(flakes.slice_at(k).probability.iter().map(|p| {
                 sum += p;
                 sum as f32
             }));
         }
-        Self { flakes, cumulative }
+        let root = |lab: &[f32; 3]| [(lab[0] + 16.0) / 116.0, lab[1] / 500.0, lab[2] / 200.0];
+        let boxes = flakes.lower.iter().zip(&flakes.upper).map(|(lower, upper)| {
+            let (lower, upper) = (root(lower), root(upper));
+            RootBox { lower, extent: std::array::from_fn(|k| upper[k] - lower[k]) }
+        });
+        let column = |xyz: [f64; 3]| xyz_to_rgb(xyz).map(|v| (v / std::f64::consts::PI) as f32);
+        Self {
+            flakes,
+            theta_h: QuickGrid::new(&flakes.theta_h),
+            theta_d: QuickGrid::new(&flakes.theta_d),
+            persistence: flakes.texture.persistence_deg.map(|p| p as f32),
+            cumulative,
+            boxes: boxes.collect(),
+            to_rgb: [column([D65_2.x, 0.0, 0.0]), column([0.0, D65_2.y, 0.0]), column([0.0, 0.0, D65_2.z])],
+        }
     }
 
     /// Size and persistence of these flakes.
@@ -206,36 +237,35 @@ impl<'a> FlakeSampler<'a> {
 
     /// Flake reflectance of a cell in 1/sr at an angle pair in degrees, bilinear between slices, not clamped.
     #[must_use]
-    #[allow(clippy::cast_possible_truncation)] // texel precision is f32
-    pub fn color(&self, cell: u32, theta_h_deg: f64, theta_d_deg: f64) -> [f32; 3] {
-        let persistence = self.flakes.texture.persistence_deg.map(|p| p as f32);
-        let draw = TexelDraw::of(cell, theta_h_deg as f32, theta_d_deg as f32, persistence);
-        let row = self.flakes.theta_h.bracket(theta_h_deg);
-        let column = self.flakes.theta_d.bracket(theta_d_deg);
-        let (u, v) = (row.fraction as f32, column.fraction as f32);
+    pub fn color(&self, cell: u32, theta_h_deg: f32, theta_d_deg: f32) -> [f32; 3] {
+        let draw = TexelDraw::of(cell, theta_h_deg, theta_d_deg, self.persistence);
+        let (row, column) = (self.theta_h.bracket(theta_h_deg), self.theta_d.bracket(theta_d_deg));
+        let columns = self.flakes.theta_d.len();
         let mut sum = [0.0; 3];
-        for (h, wh) in [(row.low, 1.0 - u), (row.high, u)] {
-            for (d, wd) in [(column.low, 1.0 - v), (column.high, v)] {
+        for (h, wh) in [(row.low, 1.0 - row.fraction), (row.high, row.fraction)] {
+            for (d, wd) in [(column.low, 1.0 - column.fraction), (column.high, column.fraction)] {
                 if wh * wd > 0.0 {
-                    let color = self.draw(h * self.flakes.theta_d.len() + d, draw);
+                    let roots = self.draw(h * columns + d, draw);
                     for k in 0..3 {
-                        sum[k] += wh * wd * color[k];
+                        sum[k] += wh * wd * roots[k];
                     }
                 }
             }
         }
-        sum
+        std::array::from_fn(|k| sum[0] * self.to_rgb[0][k] + sum[1] * self.to_rgb[1][k] + sum[2] * self.to_rgb[2][k])
     }
 
-    /// Color of one draw from slice `k`, in 1/sr.
+    /// XYZ over white of one draw from slice `k`.
     fn draw(&self, k: usize, draw: TexelDraw) -> [f32; 3] {
         let range = self.flakes.offsets[k] as usize..self.flakes.offsets[k + 1] as usize;
         let cumulative = &self.cumulative[range.clone()];
-        let cluster = range.start + cumulative.partition_point(|&c| c <= draw.pick).min(range.len() - 1);
-        let (lower, upper) = (self.flakes.lower[cluster], self.flakes.upper[cluster]);
-        let at = |axis: usize| lower[axis] + (upper[axis] - lower[axis]) * draw.place[axis];
-        Lab { l: f64::from(at(0)), a: f64::from(at(1)), b: f64::from(at(2)) }
-            .to_rgb()
-            .map(|v| (v / std::f64::consts::PI) as f32)
+        let below = if cumulative.len() <= COUNTED {
+            cumulative.iter().map(|&c| u32::from(c <= draw.pick)).sum::<u32>() as usize
+        } else {
+            cumulative.partition_point(|&c| c <= draw.pick)
+        };
+        let RootBox { lower, extent } = self.boxes[range.start + below.min(range.len() - 1)];
+        let [y, u, v]: [f32; 3] = std::array::from_fn(|axis| lower[axis] + extent[axis] * draw.place[axis]);
+        [expand_f32(y + u), expand_f32(y), expand_f32(y - v)]
     }
 }

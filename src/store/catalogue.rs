@@ -123,8 +123,8 @@ pub trait Paints: Send + Sync {
     /// Up to `limit` paints whose name or source contains `q`, whatever the case, from `cursor` on.
     fn paints<'a>(&'a self, q: Option<&'a str>, cursor: Option<i64>, limit: u32) -> Task<'a, PaintPage>;
 
-    /// Removes a paint and says which of its blobs nothing else on record names.
-    fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<Vec<Hash>>>;
+    /// Removes a paint and hands out what was on record.
+    fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>>;
 }
 
 /// Blends on record.
@@ -161,6 +161,9 @@ pub trait JobBook: Send + Sync {
 pub trait Catalogue: Paints + Blends + JobBook {
     /// Asks the backend for a sign of life.
     fn ping(&self) -> Task<'_, ()>;
+
+    /// Whether a paint, a blend or the request of an unfinished job names this blob.
+    fn names_blob(&self, blob: Hash) -> Task<'_, bool>;
 }
 
 impl JobState {

@@ -89,15 +89,18 @@ async fn records_conform(catalogue: &dyn Catalogue) {
     assert_eq!(catalogue.blend("b_1").await.expect("reads"), Some(blend));
     assert!(catalogue.blend("b_2").await.expect("reads").is_none());
 
-    // Blobs that others still name are not orphans: the upload until its last paint goes, a blob that is a blend's too.
-    let orphans = |id: &'static str| async move { catalogue.remove_paint(id).await.expect("removes") };
-    assert_eq!(orphans("p_1").await, Some(vec![Hash::of(b"p_1")]));
-    assert_eq!(orphans("p_1").await, None);
-    assert_eq!(orphans("p_2").await, Some(Vec::new()));
+    // A blob is named by paints, blends and the requests of unfinished jobs.
+    let named = |blob: Hash| async move { catalogue.names_blob(blob).await.expect("asks") };
     let wants_it = new_job("j_wants", "p_4", &format!(r#"{{"upload":"{upload}"}}"#));
     catalogue.submit_job(&wants_it).await.expect("submits");
-    assert_eq!(orphans("p_3").await, Some(vec![Hash::of(b"p_3")]));
+    for id in ["p_1", "p_2", "p_3"] {
+        let gone = catalogue.remove_paint(id).await.expect("removes").expect("was there");
+        assert_eq!(named(gone.paint).await, id == "p_2", "only a blend names that one");
+        assert!(named(upload).await);
+        assert!(catalogue.remove_paint(id).await.expect("removes nothing").is_none());
+    }
     assert!(catalogue.end_job("j_wants", JobState::Cancelled, None).await.expect("ends"));
+    assert!(!named(upload).await);
     assert!(catalogue.paints(None, None, 10).await.expect("lists").paints.is_empty());
 }
 

@@ -58,6 +58,20 @@ impl Catalogue for SqliteCatalogue {
             Ok(())
         })
     }
+
+    fn names_blob(&self, blob: Hash) -> Task<'_, bool> {
+        Box::pin(async move {
+            let (named,): (bool,) = sqlx::query_as(
+                "SELECT EXISTS (SELECT 1 FROM paints WHERE measurement = ?1 OR paint = ?1)
+                     OR EXISTS (SELECT 1 FROM blends WHERE blend = ?1)
+                     OR EXISTS (SELECT 1 FROM jobs WHERE state IN ('queued', 'running') AND instr(request, ?1) > 0)",
+            )
+            .bind(blob.to_string())
+            .fetch_one(&self.write)
+            .await?;
+            Ok(named)
+        })
+    }
 }
 
 fn hash(text: &str, what: &'static str) -> Result<Hash, StoreError> {

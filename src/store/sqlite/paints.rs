@@ -4,7 +4,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use super::{SqliteCatalogue, hash};
-use crate::store::blobs::{Hash, Task};
+use crate::store::blobs::Task;
 use crate::store::{PaintPage, PaintRecord, Paints, StoreError};
 
 fn record(row: &SqliteRow) -> Result<PaintRecord, StoreError> {
@@ -67,32 +67,11 @@ impl Paints for SqliteCatalogue {
         })
     }
 
-    fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<Vec<Hash>>> {
+    fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>> {
         Box::pin(async move {
-            let mut transaction = self.write.begin().await?;
-            let row = sqlx::query("DELETE FROM paints WHERE id = ? RETURNING *")
-                .bind(id)
-                .fetch_optional(&mut *transaction)
-                .await?;
-            let Some(gone) = row.as_ref().map(record).transpose()? else { return Ok(None) };
-            let mut orphans = Vec::new();
-            for blob in gone.measurement.into_iter().chain([gone.paint]) {
-                // A job that is not done may still want the measurement.
-                let (named,): (i64,) = sqlx::query_as(
-                    "SELECT EXISTS (SELECT 1 FROM paints WHERE measurement = ?1 OR paint = ?1)
-                         OR EXISTS (SELECT 1 FROM blends WHERE blend = ?1)
-                         OR EXISTS (SELECT 1 FROM jobs
-                                    WHERE state IN ('queued', 'running') AND instr(request, ?1) > 0)",
-                )
-                .bind(blob.to_string())
-                .fetch_one(&mut *transaction)
-                .await?;
-                if named == 0 {
-                    orphans.push(blob);
-                }
-            }
-            transaction.commit().await?;
-            Ok(Some(orphans))
+            let row =
+                sqlx::query("DELETE FROM paints WHERE id = ? RETURNING *").bind(id).fetch_optional(&self.write).await?;
+            row.as_ref().map(record).transpose()
         })
     }
 }

@@ -1,0 +1,81 @@
+//! Blending what lies under the flakes: coat, diffuse, color table.
+
+use super::clamp::Ledger;
+use super::{BlendError, BlendedPaint};
+use crate::color::Lab;
+use crate::paint::{AngleGrid, CarPaint, Coat, ColorTable, Limits, MAX_LAB, MAX_WEIGHT};
+
+/// Angles of all the paints' color tables, each once.
+pub(super) fn common_table_grid(paints: &[&CarPaint]) -> Result<(AngleGrid, AngleGrid), BlendError> {
+    common_grid(paints.iter().map(|p| (p.color_table.theta_h(), p.color_table.theta_d())))
+        .map(|grid| grid.unwrap_or_else(|| (AngleGrid::single(), AngleGrid::single())))
+}
+
+/// The union of several pairs of angle grids, `None` of none.
+pub(super) fn common_grid<'a>(
+    grids: impl Iterator<Item = (&'a AngleGrid, &'a AngleGrid)>,
+) -> Result<Option<(AngleGrid, AngleGrid)>, BlendError> {
+    let union = grids.fold(None, |union: Option<(AngleGrid, AngleGrid)>, (h, d)| {
+        Some(union.map_or_else(|| (h.clone(), d.clone()), |(uh, ud)| (uh.union(h), ud.union(d))))
+    });
+    let accepted = Limits::default().angles * super::PAINTS.end();
+    match union.as_ref().map(|(h, d)| h.len().max(d.len())) {
+        Some(angles) if angles > accepted => Err(BlendError::Angles { angles, accepted }),
+        _ => Ok(union),
+    }
+}
+
+/// Coats blend linearly; an uncoated paint is a coat of index 1, as rough and thick as its partners'.
+pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> Option<Coat> {
+    let first = paints.iter().find_map(|p| p.coat)?;
+    let of = |paint: &BlendedPaint| paint.coat.unwrap_or(Coat { ior: 1.0, ..first });
+    let mix = |get: &dyn Fn(Coat) -> f64| paints.iter().zip(weights).map(|(p, w)| w * get(of(p))).sum::<f64>();
+    let ior = ledger.hold("coat.ior", mix(&|c| c.ior), 1.0, 4.0);
+    if ior == 1.0 {
+        return None;
+    }
+    let thick = paints.iter().all(|p| p.coat.is_none_or(|c| c.thickness_um.is_some()));
+    Some(Coat {
+        ior,
+        roughness: ledger.hold("coat.roughness", mix(&|c| c.roughness), 0.0, 1.0),
+        thickness_um: thick
+            .then(|| ledger.hold("coat.thickness_um", mix(&|c| c.thickness_um.unwrap_or(0.0)), 0.0, 1e6)),
+    })
+}
+
+/// Diffuse albedo blends linearly.
+pub(super) fn diffuse(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        let value = paints.iter().zip(weights).map(|(p, w)| w * p.diffuse[c]).sum();
+        ledger.hold("diffuse", value, 0.0, MAX_WEIGHT)
+    })
+}
+
+/// Color tables blend in CIELAB, node by node (Golla and Klein 2018, 4.2).
+pub(super) fn color_table(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> ColorTable {
+    let first = &paints[0].color_table;
+    let (mut held, mut worst) = (0, 0.0_f64);
+    let mut mix = |get: &dyn Fn(&ColorTable) -> Lab| {
+        let mut sum = [0.0; 3];
+        for (paint, w) in paints.iter().zip(weights) {
+            let lab = get(&paint.color_table).to_array();
+            for axis in 0..3 {
+                sum[axis] += w * lab[axis];
+            }
+        }
+        for value in &mut sum {
+            let beyond = value.abs() - MAX_LAB;
+            if beyond > 0.0 {
+                held += 1;
+                worst = worst.max(beyond);
+                *value = value.clamp(-MAX_LAB, MAX_LAB);
+            }
+        }
+        Lab::from(sum)
+    };
+    let nodes: Vec<Lab> = (0..first.nodes().len()).map(|k| mix(&|t| t.nodes()[k])).collect();
+    let overall = mix(&|t| t.overall());
+    ledger.record("color_table", "Lab held to -2000..2000", held, 3 * (nodes.len() + 1), worst);
+    ColorTable::new(first.theta_h().clone(), first.theta_d().clone(), nodes, overall)
+        .expect("one finite color per node of the common grid")
+}

@@ -1,0 +1,214 @@
+//! What paint labs hand in: bytes in, a reflectance that can be asked for any pair of directions out.
+//!
+//! Every reader checks every count and offset against the bytes it was given before it believes them, names the field,
+//! the value and what would be accepted when it refuses, and never panics on damaged input. What a reader returns is
+//! the measurement as it is: nothing is smoothed, clamped or filled in, and where nothing was measured the answer is
+//! `None`.
+//!
+//! Bare `.bsdf`, MPI and MERL files are measured in air and include everything the sample did to light, the clear
+//! coat's highlight as well. Left to others: turning a measurement into a paint (`fit`).
+
+mod merl;
+mod mpi;
+mod rgl;
+mod table;
+mod tensor;
+
+pub use merl::read_merl;
+pub use mpi::{MPI_HEADER_BYTES, read_mpi};
+pub use rgl::{RglError, RglMeasurement};
+pub use table::{HalfAngleTable, TableError, ThetaHSpacing};
+pub use tensor::TensorError;
+
+use crate::color::LinearRgb;
+use crate::paint::{Direction, Limits};
+
+/// Something that answers how much it reflects from one direction to another.
+pub trait MeasuredBrdf: Sync {
+    /// BRDF in 1/sr, linear sRGB, for unit directions, normal `(0, 0, 1)`; `None` where nothing was measured.
+    ///
+    /// Sensor noise and colors outside the gamut may make a channel negative.
+    fn reflectance(&self, wi: Direction, wo: Direction) -> Option<LinearRgb>;
+
+    /// Share of the stored values that are marked invalid, `0..=1`.
+    fn invalid_share(&self) -> f64 {
+        0.0
+    }
+}
+
+/// How the bytes of a measurement are laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// Tensor file of EPFL's material database (`.bsdf`).
+    Rgl,
+    /// Half-angle table of the MPI car paints of 2005.
+    Mpi2005,
+    /// Half-angle table of the MERL database.
+    Merl,
+    /// Measured-paint package, a zip archive.
+    Package,
+}
+
+/// What a caller knows about a file that its bytes do not say.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// The layout; `None` finds it out from the bytes.
+    pub layout: Option<Layout>,
+    /// Spacing of a table's θh; `None` is the layout's own.
+    pub theta_h: Option<ThetaHSpacing>,
+    /// Bytes before the values of an MPI table; `None` is [`MPI_HEADER_BYTES`].
+    pub header_bytes: Option<u64>,
+}
+
+/// A reflectance measured in air, without flake pictures.
+#[derive(Clone, Debug)]
+pub enum BrdfMeasurement {
+    /// A tensor file.
+    Rgl(RglMeasurement),
+    /// An MPI or MERL table.
+    Table(HalfAngleTable),
+}
+
+/// Why bytes are no measurement.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeasurementError {
+    /// Neither the first bytes nor the length belong to a known layout.
+    #[error(
+        "the measurement has {bytes} bytes that begin with {begin:02x?}: that is no tensor file, package, MPI 2005 \
+         table (17496000 bytes and a header of 84) or MERL table (34992012 bytes); say which layout it has"
+    )]
+    Unknown {
+        /// Length of the input.
+        bytes: usize,
+        /// Its first bytes, at most 8.
+        begin: Vec<u8>,
+    },
+    /// More bytes than are accepted.
+    #[error("the measurement has {bytes} bytes, accepted are {accepted}")]
+    Size {
+        /// Length of the input.
+        bytes: usize,
+        /// The limit.
+        accepted: u64,
+    },
+    /// A package where a bare BRDF was wanted.
+    #[error("this is a measured-paint package, not a bare BRDF")]
+    Package,
+    /// A damaged tensor file, or one of something else.
+    #[error("tensor file: {0}")]
+    Rgl(#[from] RglError),
+    /// A damaged table.
+    #[error("BRDF table: {0}")]
+    Table(#[from] TableError),
+}
+
+/// Finds out the layout from the first bytes or the length.
+///
+/// # Errors
+///
+/// [`MeasurementError::Unknown`] when neither tells.
+pub fn sniff(bytes: &[u8], options: &ReadOptions) -> Result<Layout, MeasurementError> {
+    if let Some(layout) = options.layout {
+        return Ok(layout);
+    }
+    let header = options.header_bytes.unwrap_or(MPI_HEADER_BYTES);
+    if bytes.starts_with(tensor::MAGIC) {
+        Ok(Layout::Rgl)
+    } else if bytes.starts_with(b"PK") {
+        Ok(Layout::Package)
+    } else if bytes.len() as u64 == mpi::VALUE_BYTES + header {
+        Ok(Layout::Mpi2005)
+    } else if bytes.len() == merl::FILE_BYTES || merl::begins_like_one(bytes) {
+        Ok(Layout::Merl)
+    } else {
+        Err(MeasurementError::Unknown { bytes: bytes.len(), begin: bytes.iter().take(8).copied().collect() })
+    }
+}
+
+impl BrdfMeasurement {
+    /// Reads a bare BRDF of any layout.
+    ///
+    /// # Errors
+    ///
+    /// [`MeasurementError`] when the layout is unknown or the file is damaged, too large, or a package.
+    pub fn read(bytes: &[u8], options: &ReadOptions, limits: &Limits) -> Result<Self, MeasurementError> {
+        if bytes.len() as u64 > limits.bytes {
+            return Err(MeasurementError::Size { bytes: bytes.len(), accepted: limits.bytes });
+        }
+        Ok(match sniff(bytes, options)? {
+            Layout::Rgl => Self::Rgl(RglMeasurement::read(bytes)?),
+            Layout::Mpi2005 => {
+                let header = options.header_bytes.unwrap_or(MPI_HEADER_BYTES);
+                Self::Table(read_mpi(bytes, header, options.theta_h.unwrap_or(ThetaHSpacing::Linear))?)
+            }
+            Layout::Merl => Self::Table(read_merl(bytes, options.theta_h.unwrap_or(ThetaHSpacing::SquareRoot))?),
+            Layout::Package => return Err(MeasurementError::Package),
+        })
+    }
+
+    /// What the file says about itself, where it says anything.
+    #[must_use]
+    pub fn description(&self) -> Option<&str> {
+        match self {
+            Self::Rgl(tensor) => tensor.description(),
+            Self::Table(_) => None,
+        }
+    }
+
+    /// What a reader of the paint should know about this measurement.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        match self {
+            Self::Rgl(tensor) if tensor.is_anisotropic() => vec![format!(
+                "the sample is anisotropic ({} azimuths were measured); a car paint is not, so its reflectance is \
+                 averaged over azimuth",
+                tensor.azimuths()
+            )],
+            Self::Rgl(_) | Self::Table(_) => Vec::new(),
+        }
+    }
+}
+
+impl MeasuredBrdf for BrdfMeasurement {
+    fn reflectance(&self, wi: Direction, wo: Direction) -> Option<LinearRgb> {
+        match self {
+            Self::Rgl(tensor) => tensor.reflectance(wi, wo),
+            Self::Table(table) => table.reflectance(wi, wo),
+        }
+    }
+
+    fn invalid_share(&self) -> f64 {
+        match self {
+            Self::Rgl(_) => 0.0,
+            Self::Table(table) => table.invalid_share(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_file_is_refused_with_its_length_and_first_bytes() {
+        let error = BrdfMeasurement::read(b"hello, paint", &ReadOptions::default(), &Limits::default());
+        let text = error.expect_err("no measurement").to_string();
+        assert!(text.contains("12 bytes") && text.contains("68"), "{text}");
+    }
+
+    #[test]
+    fn the_stated_layout_wins_over_the_bytes() {
+        let options = ReadOptions { layout: Some(Layout::Merl), ..ReadOptions::default() };
+        assert_eq!(sniff(b"tensor_file\0", &options), Ok(Layout::Merl));
+        assert_eq!(sniff(b"tensor_file\0", &ReadOptions::default()), Ok(Layout::Rgl));
+        assert_eq!(sniff(b"PK\x03\x04", &ReadOptions::default()), Ok(Layout::Package));
+    }
+
+    #[test]
+    fn more_bytes_than_the_limit_are_refused() {
+        let limits = Limits { bytes: 4, ..Limits::default() };
+        let error = BrdfMeasurement::read(b"hello", &ReadOptions::default(), &limits).expect_err("too long");
+        assert_eq!(error, MeasurementError::Size { bytes: 5, accepted: 4 });
+    }
+}

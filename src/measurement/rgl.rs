@@ -1,0 +1,454 @@
+//! Measurements of EPFL's material database: an adaptive parameterisation, evaluated for any pair of directions.
+//!
+//! ```text
+//! f(i,o) = rgb(u; i) · ndf(m) / (4 σ(i) o_z),   m the half vector,  u = the sample that vndf(·; i) warps to m
+//! ```
+//!
+//! Axes are `√(2θ/π)` and `(φ+π)/2π`. For each measured incidence the visible normals' density is a bilinear patch
+//! per cell; its inverse warp (marginal over rows, then conditional along the row) is evaluated in closed form, and
+//! densities and their integrals are interpolated linearly between the two nearest incidences. rgb is bilinear in the
+//! sample `u`.
+//!
+//! J. Dupuy, W. Jakob, "An adaptive parameterization for efficient material acquisition and rendering", ACM TOG 37
+//! (2018). An isotropic file holds one azimuth of incidence; of an anisotropic one the azimuths are averaged, because
+//! a car paint has none. Out-of-gamut colors stay negative. Accuracy beyond 80° from the normal is the instrument's.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use super::MeasuredBrdf;
+use super::tensor::{TensorError, Tensors};
+use crate::color::LinearRgb;
+use crate::paint::{Direction, half_angles};
+
+/// Why a tensor file is no reflectance.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RglError {
+    /// The file itself.
+    #[error(transparent)]
+    Tensor(#[from] TensorError),
+    /// A field of a shape that does not go with the others.
+    #[error("field {name} has shape {shape:?}, accepted is {accepted}")]
+    Shape {
+        /// Name of the field.
+        name: &'static str,
+        /// Its shape.
+        shape: Vec<usize>,
+        /// What it must be.
+        accepted: String,
+    },
+    /// Angles that do not ascend, or lie outside their range.
+    #[error("{name}[{index}] is {value}, angles ascend within {accepted}")]
+    Angle {
+        /// `theta_i` or `phi_i`.
+        name: &'static str,
+        /// Position in the list.
+        index: usize,
+        /// The offending angle, radians.
+        value: f32,
+        /// Range in radians.
+        accepted: &'static str,
+    },
+    /// A number that is not finite, or negative where it is a density.
+    #[error("{name}[{index}] is {value}, accepted are {accepted}")]
+    Value {
+        /// Name of the field.
+        name: &'static str,
+        /// Flat position in it.
+        index: usize,
+        /// The offending number.
+        value: f32,
+        /// What would be accepted.
+        accepted: &'static str,
+    },
+    /// A file whose colors are not multiplied by the warp's Jacobian.
+    #[error("field jacobian is {0}, accepted is 1")]
+    Jacobian(u8),
+}
+
+/// A rectangle of values over the unit square, bilinear in between.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Extent {
+    rows: usize,
+    columns: usize,
+}
+
+/// Where a point of the unit square lies among an extent's vertices.
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    row: usize,
+    column: usize,
+    /// Offsets in the cell, `0..=1`.
+    x: f64,
+    y: f64,
+}
+
+impl Extent {
+    const fn len(self) -> usize {
+        self.rows * self.columns
+    }
+
+    fn cell(self, u: f64, v: f64) -> Cell {
+        let (column, x) = split(u, self.columns);
+        let (row, y) = split(v, self.rows);
+        Cell { row, column, x, y }
+    }
+
+    /// Bilinear value in a table of this extent.
+    fn bilinear(self, table: &[f32], cell: Cell) -> f64 {
+        let at = |r: usize, c: usize| f64::from(table[(cell.row + r) * self.columns + cell.column + c]);
+        let lower = (1.0 - cell.x) * at(0, 0) + cell.x * at(0, 1);
+        let upper = (1.0 - cell.x) * at(1, 0) + cell.x * at(1, 1);
+        (1.0 - cell.y) * lower + cell.y * upper
+    }
+}
+
+/// Vertex below a coordinate in `0..=1` among `count >= 2`, and the offset from it.
+fn split(u: f64, count: usize) -> (usize, f64) {
+    let x = u.clamp(0.0, 1.0) * f64::from(u32::try_from(count - 1).unwrap_or(u32::MAX));
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0..=count-1 by the clamp.
+    let low = (x as usize).min(count - 2);
+    (low, x - f64::from(u32::try_from(low).unwrap_or(u32::MAX)))
+}
+
+/// The density of visible normals for one incidence, with its integrals along rows and over rows.
+#[derive(Clone, Debug)]
+struct Density {
+    values: Vec<f64>,
+    /// Integral along a row up to each vertex, in cells.
+    along: Vec<f64>,
+    /// Integral over rows up to each row, in cells.
+    over: Vec<f64>,
+}
+
+impl Density {
+    fn new(extent: Extent, raw: &[f32]) -> Self {
+        let mut along = Vec::with_capacity(extent.len());
+        let mut over = Vec::with_capacity(extent.rows);
+        let (mut sum, mut before) = (0.0, None);
+        for row in raw.chunks_exact(extent.columns) {
+            let mut integral = 0.0;
+            along.push(0.0);
+            for pair in row.windows(2) {
+                integral += f64::midpoint(f64::from(pair[0]), f64::from(pair[1]));
+                along.push(integral);
+            }
+            if let Some(before) = before {
+                sum += f64::midpoint(before, integral);
+            }
+            over.push(sum);
+            before = Some(integral);
+        }
+        let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+        let scaled = |v: Vec<f64>| v.into_iter().map(|x| x * scale).collect();
+        Self { values: raw.iter().map(|&v| f64::from(v) * scale).collect(), along: scaled(along), over: scaled(over) }
+    }
+}
+
+/// One azimuth of incidence.
+#[derive(Clone, Debug)]
+struct Azimuth {
+    phi: f64,
+    /// Share in the average over azimuth.
+    weight: f64,
+    /// One per `theta_i`.
+    densities: Vec<Density>,
+}
+
+/// A reflectance from the database.
+#[derive(Clone, Debug)]
+pub struct RglMeasurement {
+    description: Option<String>,
+    theta_i: Vec<f64>,
+    azimuths: Vec<Azimuth>,
+    isotropic: bool,
+    vndf: Extent,
+    ndf: (Extent, Vec<f32>),
+    sigma: (Extent, Vec<f32>),
+    rgb: Extent,
+    /// Azimuth slowest, then incidence, channel, row, column.
+    colors: Vec<f32>,
+}
+
+impl RglMeasurement {
+    /// Reads and checks a tensor file.
+    ///
+    /// # Errors
+    ///
+    /// [`RglError`] for a damaged file, a missing field, shapes that do not go together, angles out of order, and
+    /// numbers that are not finite.
+    pub fn read(bytes: &[u8]) -> Result<Self, RglError> {
+        let file = Tensors::read(bytes)?;
+        if let Some(&flag @ (0 | 2..)) = file.bytes("jacobian").and_then(<[u8]>::first) {
+            return Err(RglError::Jacobian(flag));
+        }
+        let theta_i = angles(&file, "theta_i", 2, -1e-3..=1.572, "0 to pi/2")?;
+        let phi_i = angles(&file, "phi_i", 1, -6.3..=6.3, "-2 pi to 2 pi")?;
+        let ndf = surface(&file, "ndf")?;
+        let sigma = surface(&file, "sigma")?;
+
+        let (vndf, shape) = finite(&file, "vndf", true)?;
+        let &[p, t, rows, columns] = shape else { return Err(wrong("vndf", shape, "4 dimensions")) };
+        if (p, t) != (phi_i.len(), theta_i.len()) || rows < 2 || columns < 2 {
+            return Err(wrong("vndf", shape, &format!("[{}, {}, 2.., 2..]", phi_i.len(), theta_i.len())));
+        }
+        let extent = Extent { rows, columns };
+        let (colors, shape) = finite(&file, "rgb", false)?;
+        let &[p, t, 3, rows, columns] = shape else { return Err(wrong("rgb", shape, "[.., .., 3, .., ..]")) };
+        if (p, t) != (phi_i.len(), theta_i.len()) || rows < 2 || columns < 2 {
+            return Err(wrong("rgb", shape, &format!("[{}, {}, 3, 2.., 2..]", phi_i.len(), theta_i.len())));
+        }
+
+        let weights = trapezoid(&phi_i);
+        let azimuths = phi_i
+            .iter()
+            .zip(weights)
+            .zip(vndf.chunks_exact(extent.len() * theta_i.len()))
+            .map(|((&phi, weight), slices)| Azimuth {
+                phi,
+                weight,
+                densities: slices.chunks_exact(extent.len()).map(|s| Density::new(extent, s)).collect(),
+            })
+            .collect();
+        Ok(Self {
+            description: file.bytes("description").map(|d| String::from_utf8_lossy(d).chars().take(200).collect()),
+            isotropic: phi_i.len() <= 2,
+            theta_i,
+            azimuths,
+            vndf: extent,
+            ndf,
+            sigma,
+            rgb: Extent { rows, columns },
+            colors,
+        })
+    }
+
+    /// The sample's name as the file gives it.
+    #[must_use]
+    pub fn description(&self) -> Option<&str> {
+        self.description.as_deref()
+    }
+
+    /// Whether the sample was measured, and is averaged, over azimuths of incidence.
+    #[must_use]
+    pub const fn is_anisotropic(&self) -> bool {
+        !self.isotropic
+    }
+
+    /// How many azimuths of incidence were measured.
+    #[must_use]
+    pub fn azimuths(&self) -> usize {
+        self.azimuths.len()
+    }
+
+    /// `f · o_z` for one azimuth of incidence; `turn` is the azimuth of the half vector from that of the incidence.
+    fn at(&self, index: usize, azimuth: &Azimuth, theta_i: f64, theta_m: f64, turn: f64) -> LinearRgb {
+        let phi_m = if self.isotropic { turn } else { azimuth.phi + turn };
+        let (u, v) = ((theta_m / FRAC_PI_2).sqrt(), ((phi_m + PI) / TAU).rem_euclid(1.0));
+        let low = self.theta_i.partition_point(|&t| t <= theta_i).clamp(1, self.theta_i.len() - 1) - 1;
+        let (from, to) = (self.theta_i[low], self.theta_i[low + 1]);
+        let weight = ((theta_i - from) / (to - from)).clamp(0.0, 1.0);
+
+        let (a, b) = (&azimuth.densities[low], &azimuth.densities[low + 1]);
+        let blend = |x: f64, y: f64| (1.0 - weight) * x + weight * y;
+        let Some((x, y)) = self.sample_of(u, v, |table, k| blend(table(a)[k], table(b)[k])) else { return [0.0; 3] };
+
+        let cell = self.rgb.cell(x, y);
+        let channel = |incidence: usize, c: usize| {
+            let start = ((index * self.theta_i.len() + incidence) * 3 + c) * self.rgb.len();
+            self.rgb.bilinear(&self.colors[start..start + self.rgb.len()], cell)
+        };
+        let ndf = self.ndf.0.bilinear(&self.ndf.1, self.ndf.0.cell(u, v));
+        let phi_i = if self.isotropic { 0.0 } else { azimuth.phi };
+        let sigma_at = ((theta_i / FRAC_PI_2).sqrt(), ((phi_i + PI) / TAU).rem_euclid(1.0));
+        let sigma = self.sigma.0.bilinear(&self.sigma.1, self.sigma.0.cell(sigma_at.0, sigma_at.1));
+        let scale = if sigma > 0.0 { ndf / (4.0 * sigma) } else { 0.0 };
+        std::array::from_fn(|c| blend(channel(low, c), channel(low + 1, c)) * scale)
+    }
+
+    /// The sample that the density warps to `(u, v)`; `read` blends a table of both incidences at a flat index.
+    ///
+    /// Within a cell the density is bilinear, so its integral along the row is a quadratic in x, and the row
+    /// integrals, linear in y, integrate to a quadratic in y. `None` where the density vanishes along the whole row.
+    fn sample_of(&self, u: f64, v: f64, read: impl Fn(fn(&Density) -> &[f64], usize) -> f64) -> Option<(f64, f64)> {
+        let cell = self.vndf.cell(u, v);
+        let (x, y, columns) = (cell.x, cell.y, self.vndf.columns);
+        let vertex = |r: usize, c: usize| (cell.row + r) * columns + cell.column + c;
+        let mix = |lower: f64, upper: f64| (1.0 - y) * lower + y * upper;
+        let value = |r, c| read(|d| &d.values, vertex(r, c));
+        let along = |k| read(|d| &d.along, k);
+        let left = mix(value(0, 0), value(1, 0));
+        let right = mix(value(0, 1), value(1, 1));
+        let within = left * x + 0.5 * x * x * (right - left) + mix(along(vertex(0, 0)), along(vertex(1, 0)));
+        let row = |r: usize| along((cell.row + r + 1) * columns - 1);
+        let (lower, upper) = (row(0), row(1));
+        let whole = mix(lower, upper);
+        let below = lower * y + 0.5 * y * y * (upper - lower) + read(|d| &d.over, cell.row);
+        (whole > 0.0).then(|| (within / whole, below))
+    }
+}
+
+impl MeasuredBrdf for RglMeasurement {
+    fn reflectance(&self, wi: Direction, wo: Direction) -> Option<LinearRgb> {
+        if !(wi[2] > 0.0 && wo[2] > 0.0) {
+            return None;
+        }
+        let half = [wi[0] + wo[0], wi[1] + wo[1]];
+        let theta_i = wi[0].hypot(wi[1]).atan2(wi[2]);
+        let theta_m = half_angles(wi, wo).theta_h;
+        let turn = half[1].atan2(half[0]) - wi[1].atan2(wi[0]);
+        let mut sum = [0.0; 3];
+        for (index, azimuth) in self.azimuths.iter().enumerate() {
+            for (s, v) in sum.iter_mut().zip(self.at(index, azimuth, theta_i, theta_m, turn)) {
+                *s += azimuth.weight * v / wo[2];
+            }
+        }
+        sum.iter().all(|v| v.is_finite()).then_some(sum)
+    }
+}
+
+fn wrong(name: &'static str, shape: &[usize], accepted: &str) -> RglError {
+    RglError::Shape { name, shape: shape.to_vec(), accepted: accepted.to_owned() }
+}
+
+/// A field of finite numbers, `>= 0` where it is a density.
+fn finite<'f>(file: &'f Tensors<'_>, name: &'static str, density: bool) -> Result<(Vec<f32>, &'f [usize]), RglError> {
+    let (values, shape) = file.floats(name)?;
+    let accepted = if density { "finite numbers from 0" } else { "finite numbers" };
+    // f32 squared sums must stay finite: nothing a goniometer writes comes near 1e15.
+    let good = |v: f32| v.abs() <= 1e15 && !(density && v < 0.0);
+    match values.iter().position(|&v| !good(v)) {
+        Some(index) => Err(RglError::Value { name, index, value: values[index], accepted }),
+        None => Ok((values, shape)),
+    }
+}
+
+fn angles(
+    file: &Tensors<'_>,
+    name: &'static str,
+    least: usize,
+    range: std::ops::RangeInclusive<f32>,
+    accepted: &'static str,
+) -> Result<Vec<f64>, RglError> {
+    let (values, shape) = file.floats(name)?;
+    if shape.len() != 1 || values.len() < least || values.len() > 4096 {
+        return Err(wrong(name, shape, &format!("one dimension of {least} to 4096")));
+    }
+    for (index, &value) in values.iter().enumerate() {
+        if !range.contains(&value) || (index > 0 && value <= values[index - 1]) {
+            return Err(RglError::Angle { name, index, value, accepted });
+        }
+    }
+    Ok(values.into_iter().map(f64::from).collect())
+}
+
+fn surface(file: &Tensors<'_>, name: &'static str) -> Result<(Extent, Vec<f32>), RglError> {
+    let (values, shape) = finite(file, name, true)?;
+    match *shape {
+        [rows, columns] if rows >= 2 && columns >= 2 => Ok((Extent { rows, columns }, values)),
+        _ => Err(wrong(name, shape, "[2.., 2..]")),
+    }
+}
+
+/// Weights of an average over ascending nodes, trapezoidal: the two ends of a full turn are the same azimuth.
+fn trapezoid(nodes: &[f64]) -> Vec<f64> {
+    let (Some(first), Some(last)) = (nodes.first(), nodes.last()) else { return Vec::new() };
+    if nodes.len() < 2 {
+        return vec![1.0];
+    }
+    (0..nodes.len())
+        .map(|k| (nodes[(k + 1).min(nodes.len() - 1)] - nodes[k.saturating_sub(1)]) / 2.0 / (last - first))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tensor::tests::tensor_file;
+    use super::*;
+
+    /// A small file with the given azimuths; `color` gives a color by azimuth and channel.
+    fn file(phi: &[f32], color: impl Fn(usize, usize) -> f32) -> Vec<u8> {
+        let theta = [0.0, 0.8, 1.57];
+        let n = phi.len();
+        let vndf: Vec<f32> =
+            (0..n * 3 * 16).map(|k| 1.0 + f32::from(u8::try_from(k * 7 % 5).expect("small"))).collect();
+        let colors: Vec<f32> = (0..n * 3 * 3 * 4).map(|k| color(k / 36, k / 4 % 3)).collect();
+        let n = n as u64;
+        tensor_file(&[
+            ("theta_i", &[3], &theta),
+            ("phi_i", &[n], phi),
+            ("ndf", &[2, 3], &[1.0, 0.5, 0.25, 1.0, 0.5, 0.25]),
+            ("sigma", &[2, 2], &[1.0, 0.5, 1.0, 0.5]),
+            ("vndf", &[n, 3, 4, 4], &vndf),
+            ("rgb", &[n, 3, 3, 2, 2], &colors),
+        ])
+    }
+
+    #[test]
+    fn an_even_color_is_the_microfacet_formula_whatever_the_warp() {
+        let measured = RglMeasurement::read(&file(&[0.0], |_, c| [0.3, -0.2, 0.8][c])).expect("whole");
+        let (wi, wo) = ([-0.5, 0.0, 0.75_f64.sqrt()], [0.5, 0.0, 0.75_f64.sqrt()]);
+        // θi = 30°: σ at √(1/3) between 1 and 0.5; half vector along n, ndf 1.
+        let sigma = 1.0 - 0.5 * (1.0_f64 / 3.0).sqrt();
+        let rgb = measured.reflectance(wi, wo).expect("above the horizon");
+        for (got, color) in rgb.iter().zip([0.3, -0.2, 0.8]) {
+            let want = color / (4.0 * sigma * wo[2]);
+            assert!((got - want).abs() < 1e-6, "{got} instead of {want}");
+        }
+        assert!(!measured.is_anisotropic());
+    }
+
+    #[test]
+    fn an_anisotropic_sample_is_averaged_over_azimuth() {
+        let phi = [-3.0, -1.5, 0.0, 1.5, 3.0];
+        let measured =
+            RglMeasurement::read(&file(&phi, |p, _| f32::from(u8::try_from(p).expect("few")))).expect("whole");
+        let one = RglMeasurement::read(&file(&[0.0], |_, _| 1.0)).expect("whole");
+        assert!(measured.is_anisotropic());
+        let (wi, wo) = ([0.3, 0.1, 0.9_f64.sqrt()], [0.1, -0.3, 0.9_f64.sqrt()]);
+        let (got, unit) = (measured.reflectance(wi, wo).expect("above"), one.reflectance(wi, wo).expect("above"));
+        // Trapezoid over 0, 1, 2, 3, 4 is 2; ndf and sigma do not change with azimuth here.
+        assert!((got[0] / unit[0] - 2.0).abs() < 1e-6, "{got:?} {unit:?}");
+    }
+
+    #[test]
+    fn the_warp_is_the_integral_of_the_density() {
+        let measured = RglMeasurement::read(&file(&[0.0], |_, _| 1.0)).expect("whole");
+        let density = &measured.azimuths[0].densities[0];
+        let read = |table: fn(&Density) -> &[f64], k: usize| table(density)[k];
+        let (u, v) = (0.37, 0.81);
+        let (x, y) = measured.sample_of(u, v, read).expect("positive density");
+        // Midpoint sums of the bilinear density: the row's share up to u, and the share of rows up to v.
+        let at = |u: f64, v: f64| {
+            let c = measured.vndf.cell(u, v);
+            let d = |r: usize, k: usize| density.values[(c.row + r) * 4 + c.column + k];
+            (1.0 - c.y) * ((1.0 - c.x) * d(0, 0) + c.x * d(0, 1)) + c.y * ((1.0 - c.x) * d(1, 0) + c.x * d(1, 1))
+        };
+        let n = 600;
+        let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(n);
+        let row = |v: f64, to: f64| (0..n).map(|k| at(middle(k) * to, v) * to).sum::<f64>();
+        assert!((x - row(v, u) / row(v, 1.0)).abs() < 1e-5);
+        let below: f64 = (0..n).map(|k| row(middle(k) * v, 1.0) * v).sum();
+        let whole: f64 = (0..n).map(|k| row(middle(k), 1.0)).sum();
+        assert!((y - below / whole).abs() < 1e-5, "{y} {}", below / whole);
+    }
+
+    #[test]
+    fn damage_is_named_by_field_and_value() {
+        let error = |bytes: &[u8]| RglMeasurement::read(bytes).expect_err("damaged").to_string();
+        assert!(error(b"nothing").contains("tensor_file"));
+        let good = file(&[0.0], |_, _| 1.0);
+        assert!(error(&good[..good.len() - 1]).contains("rgb"));
+        let bad = file(&[0.0], |_, c| if c == 1 { f32::NAN } else { 1.0 });
+        assert!(error(&bad).contains("rgb[4] is NaN"), "{}", error(&bad));
+        assert!(error(&file(&[0.5, 0.1], |_, _| 1.0)).contains("phi_i[1] is 0.1"));
+    }
+
+    #[test]
+    fn nothing_is_measured_below_the_horizon() {
+        let measured = RglMeasurement::read(&file(&[0.0], |_, _| 1.0)).expect("whole");
+        assert_eq!(measured.reflectance([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]), None);
+        assert_eq!(measured.reflectance([0.6, 0.0, -0.8], [0.0, 0.0, 1.0]), None);
+        assert!(measured.reflectance([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]).is_some());
+    }
+}

@@ -1,0 +1,202 @@
+//! Light that leaves one point of the picture towards the camera.
+//!
+//! Per sample: the directional lights, one direction drawn by the environment's radiance and one by the paint's own
+//! lobes, weighted by the balance heuristic (E. Veach 1997), and the coat's mirror image. All samples of a pixel are
+//! one low-discrepancy set. Flakes belong to the texel under the sample, so a pixel averages the texels it covers.
+
+use super::effects::{Effect, EffectPlan};
+use super::environment::Source;
+use super::ground::Ground;
+use super::kernel::Kernel;
+use super::light_table::LightTable;
+use super::points::Points;
+use super::scene::{Background, Scene};
+use super::surface::{Hit, Surface};
+use super::vector::{Frame, Vec3, add, along, cross, dot, scale, smoothstep, sub, unit};
+use crate::paint::{CarPaint, RandomTexture, cell_spacing};
+
+/// Texels a side of the random texture's tile; every repetition of it is drawn anew.
+const TILE: u32 = 256;
+
+/// A scene prepared for shading one paint.
+pub(super) struct Shader<'a> {
+    scene: &'a Scene,
+    kernel: Kernel<'a>,
+    surface: Surface,
+    ground: Ground,
+    lights: Vec<(Vec3, Vec3)>,
+    light_table: Option<LightTable>,
+    texture: Option<Texture>,
+    lens: Lens,
+    coated: bool,
+}
+
+struct Texture {
+    tile: RandomTexture,
+    texels_per_unit: f32,
+}
+
+/// Rays of the camera.
+struct Lens {
+    right: Vec3,
+    up: Vec3,
+    forward: Vec3,
+    half: [f32; 2],
+    pixel: [f32; 2],
+}
+
+impl<'a> Shader<'a> {
+    pub(super) fn new(paint: &'a CarPaint, scene: &'a Scene) -> (Self, EffectPlan) {
+        let light_table = LightTable::new(&scene.environment);
+        let plan = EffectPlan::new(paint, scene, light_table.is_some());
+        let surface = Surface::new(scene.shape);
+        let texture = paint.flakes.as_ref().map(|flakes| {
+            let t = &flakes.texture;
+            #[allow(clippy::cast_possible_truncation)] // pixels are f32
+            let texels_per_unit = (scene.object_mm * 500.0 / t.texel_um) as f32;
+            Texture { tile: RandomTexture::new(TILE, TILE, cell_spacing(t.grain_um / t.texel_um), scene.seed), texels_per_unit }
+        });
+        let shader = Self {
+            scene,
+            kernel: Kernel::new(paint, plan.has(Effect::Flakes)),
+            ground: Ground::new(&surface),
+            surface,
+            lights: scene.lights.iter().map(|light| (unit(light.towards), light.irradiance)).collect(),
+            light_table,
+            texture,
+            lens: Lens::new(scene),
+            coated: plan.has(Effect::Coat),
+        };
+        (shader, plan)
+    }
+
+    /// Mean radiance of a pixel.
+    pub(super) fn pixel(&self, x: u32, y: u32) -> Vec3 {
+        match (self.coated, self.texture.is_some()) {
+            (true, true) => self.pixel_of::<true, true>(x, y),
+            (true, false) => self.pixel_of::<true, false>(x, y),
+            (false, true) => self.pixel_of::<false, true>(x, y),
+            (false, false) => self.pixel_of::<false, false>(x, y),
+        }
+    }
+
+    fn pixel_of<const COATED: bool, const FLAKES: bool>(&self, x: u32, y: u32) -> Vec3 {
+        let points = Points::of_pixel(x, y, self.scene.seed);
+        let origin = self.scene.camera.origin;
+        let mut sum = [0.0; 3];
+        for index in 0..self.scene.samples_per_pixel {
+            let (direction, place) = self.lens.ray(x, y, points.pair(index, 0));
+            let light = match self.surface.meet(origin, direction) {
+                Some(hit) => self.leaving::<COATED, FLAKES>(&hit, scale(direction, -1.0), points, index),
+                None => self.behind(origin, direction, place),
+            };
+            sum = add(sum, light);
+        }
+        #[allow(clippy::cast_precision_loss)] // a few thousand
+        scale(sum, 1.0 / self.scene.samples_per_pixel as f32)
+    }
+
+    fn leaving<const COATED: bool, const FLAKES: bool>(
+        &self,
+        hit: &Hit,
+        towards_eye: Vec3,
+        points: Points,
+        index: u32,
+    ) -> Vec3 {
+        let frame = Frame::new(hit.normal, towards_eye);
+        let view = self.kernel.view::<COATED>(frame.local(towards_eye));
+        let cell = match &self.texture {
+            Some(texture) if FLAKES => {
+                let [x, y] = self.surface.texel(hit, texture.texels_per_unit);
+                texture.tile.at(x, y)
+            }
+            _ => 0,
+        };
+        let mut sum = [0.0; 3];
+        for &(towards, irradiance) in &self.lights {
+            let light = frame.local(towards);
+            if light[2] > 0.0 {
+                let (f, _) = self.kernel.evaluate::<COATED, FLAKES>(&view, light, cell);
+                sum = add(sum, [f[0] * irradiance[0] * light[2], f[1] * irradiance[1] * light[2], f[2] * irradiance[2] * light[2]]);
+            }
+        }
+        let Some(table) = &self.light_table else { return sum };
+
+        let drawn = table.sample(points.pair(index, 1));
+        let light = frame.local(drawn.direction);
+        if light[2] > 0.0 {
+            let (f, density) = self.kernel.evaluate::<COATED, FLAKES>(&view, light, cell);
+            sum = gather(sum, f, drawn.radiance, light[2] / (drawn.density + density));
+        }
+        let pick = points.pair(index, 3)[0];
+        if let Some(light) = self.kernel.sample::<COATED>(&view, pick, points.pair(index, 2)) {
+            let direction = frame.world(light);
+            let (f, density) = self.kernel.evaluate::<COATED, FLAKES>(&view, light, cell);
+            let radiance = self.scene.environment.radiance(direction);
+            sum = gather(sum, f, radiance, light[2] / (table.density(direction) + density));
+        }
+        let mirror = self.kernel.mirror(&view);
+        if COATED && mirror > 0.0 {
+            let direction = along(scale(hit.normal, 2.0 * view.outer[2]), towards_eye, -1.0);
+            sum = along(sum, self.around(hit.point, direction), mirror);
+        }
+        sum
+    }
+
+    /// What a mirror on the object sees.
+    fn around(&self, point: Vec3, direction: Vec3) -> Vec3 {
+        let radiance = self.scene.environment.radiance(direction);
+        if let (Source::Studio(_), Some([x, z])) = (self.scene.environment.source(), Ground::meet(point, direction)) {
+            let shade = 1.0 - 0.9 * self.ground.occlusion(x, z);
+            // The floor's own radiance near the object, the studio's far from it.
+            return scale(radiance, shade);
+        }
+        radiance
+    }
+
+    /// What the camera sees beside the object.
+    fn behind(&self, origin: Vec3, direction: Vec3, place: [f32; 2]) -> Vec3 {
+        if self.scene.background == Background::Environment {
+            return self.scene.environment.radiance(direction);
+        }
+        let shade = Ground::meet(origin, direction).map_or(0.0, |[x, z]| self.ground.occlusion(x, z));
+        sweep(place, shade)
+    }
+}
+
+/// A neutral sweep: a pool of light behind the object, darker corners, the object's shadow on the floor.
+///
+/// `place` is −1 to 1 from the middle to the nearer edges of the picture, y upwards.
+fn sweep(place: [f32; 2], shade: f32) -> Vec3 {
+    let out = (place[0] * place[0] * 0.7 + (place[1] - 0.15).powi(2)).sqrt();
+    let light = 0.40 - 0.24 * smoothstep(0.0, 1.5, out) + 0.07 * smoothstep(-0.2, -1.0, place[1]);
+    [light * (1.0 - 0.86 * shade); 3]
+}
+
+fn gather(sum: Vec3, f: Vec3, radiance: Vec3, weight: f32) -> Vec3 {
+    [sum[0] + f[0] * radiance[0] * weight, sum[1] + f[1] * radiance[1] * weight, sum[2] + f[2] * radiance[2] * weight]
+}
+
+impl Lens {
+    #[allow(clippy::cast_precision_loss)] // picture sizes
+    fn new(scene: &Scene) -> Self {
+        let forward = unit(sub(scene.camera.target, scene.camera.origin));
+        let level = cross(forward, [0.0, 1.0, 0.0]);
+        let right = if dot(level, level) > 1e-9 { unit(level) } else { [1.0, 0.0, 0.0] };
+        let tangent = (scene.camera.field_of_view_deg.to_radians() / 2.0).tan();
+        let [width, height] = scene.size.map(|s| s as f32);
+        let short = width.min(height);
+        let half = [tangent * width / short, tangent * height / short];
+        Self { right, up: cross(right, forward), forward, half, pixel: [2.0 / width, 2.0 / height] }
+    }
+
+    /// Direction through a place in a pixel, and the place in the picture.
+    #[allow(clippy::cast_precision_loss)]
+    fn ray(&self, x: u32, y: u32, [u, v]: [f32; 2]) -> (Vec3, [f32; 2]) {
+        let place = [(x as f32 + u) * self.pixel[0] - 1.0, 1.0 - (y as f32 + v) * self.pixel[1]];
+        let sideways = along(self.forward, self.right, place[0] * self.half[0]);
+        let short = self.half[0].min(self.half[1]);
+        let even = [place[0] * self.half[0] / short, place[1] * self.half[1] / short];
+        (unit(along(sideways, self.up, place[1] * self.half[1])), even)
+    }
+}

@@ -1,0 +1,169 @@
+//! The exact solver: a transportation simplex in whole numbers.
+//!
+//! Dantzig's method on the bipartite graph: a spanning tree is a basis; potentials with `u_i + v_j = w_ij` on its edges
+//! price all others; an edge with `w_ij < u_i + v_j` enters, the flow turns around the cycle it closes, and the edge whose
+//! flow falls to zero first leaves. Masses are whole grains (see [`super::units`]), so no pivot is degenerate, arithmetic
+//! on flows is exact and the cost falls at every pivot. Rows are priced one at a time.
+//!
+//! Potentials drift by a rounding a pivot. Before a basis is accepted they are computed afresh, and all pairs are priced
+//! against those; the target duals of the plan come out of the same pass.
+//!
+//! G. B. Dantzig, "Application of the simplex method to a transportation problem", 1951; R. K. Ahuja, T. L. Magnanti,
+//! J. B. Orlin, *Network Flows*, 1993, chapter 11.
+
+use super::cost::{Cost, CostMatrix, LANES};
+use super::plan::{Plan, target_duals_for};
+use super::problem::{Problem, TransportError};
+use super::start::{StartMemory, column_of, greedy_start, row_minimum};
+use super::tree::{Tree, for_each_point};
+use super::units::Units;
+use super::workspace::Workspace;
+use super::{LinearProgram, Solver};
+
+/// Pairs are taken as priced right down to minus this times the largest cost: several roundings of a potential.
+const PRICE_TOLERANCE: f64 = 4e-15;
+
+/// Pivots after which the method is given up, per point. Hard problems of any size were seen to need fewer than 20.
+const MOST_PIVOTS_PER_POINT: usize = 400;
+
+/// The exact solver.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TransportSimplex;
+
+impl Solver for TransportSimplex {
+    fn solve_into(
+        &self,
+        problem: &Problem,
+        cost: Cost,
+        workspace: &mut Workspace,
+        plan: &mut Plan,
+    ) -> Result<(), TransportError> {
+        problem.check_filled()?;
+        workspace.prepare(problem, cost);
+        let Workspace { matrix, units, start, simplex, .. } = workspace;
+        let job = Job { problem, matrix, units, cost };
+        let points = problem.source().len().max(problem.target().len());
+        let scratch = &mut simplex.scratch;
+        let solved = match points {
+            0..=64 => job.run(&mut simplex.to_64, start, scratch, plan),
+            65..=128 => job.run(&mut simplex.to_128, start, scratch, plan),
+            129..=256 => job.run(&mut simplex.to_256, start, scratch, plan),
+            257..=512 => job.run(&mut simplex.to_512, start, scratch, plan),
+            513..=1024 => job.run(&mut simplex.to_1024, start, scratch, plan),
+            _ => job.run(&mut simplex.to_4096, start, scratch, plan),
+        };
+        if solved {
+            return Ok(());
+        }
+        LinearProgram.solve_into(problem, cost, workspace, plan)
+    }
+}
+
+/// The solver's memory between problems.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SimplexMemory {
+    to_64: Tree<1>,
+    to_128: Tree<2>,
+    to_256: Tree<4>,
+    to_512: Tree<8>,
+    to_1024: Tree<16>,
+    to_4096: Tree<64>,
+    scratch: Scratch,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Scratch {
+    source_values: Vec<f64>,
+    target_values: Vec<[f64; LANES]>,
+    allowed: Vec<[f64; LANES]>,
+}
+
+struct Job<'a> {
+    problem: &'a Problem,
+    matrix: &'a CostMatrix,
+    units: &'a Units,
+    cost: Cost,
+}
+
+impl Job<'_> {
+    /// Solves; false if the pivots ran out.
+    fn run<const W: usize>(
+        &self,
+        tree: &mut Tree<W>,
+        start: &mut StartMemory,
+        scratch: &mut Scratch,
+        plan: &mut Plan,
+    ) -> bool {
+        let matrix = self.matrix;
+        let (sources, targets) = (self.units.supplies.len(), self.units.demands.len());
+        let Scratch { source_values, target_values, allowed } = scratch;
+        greedy_start(matrix, self.units, start);
+        tree.plant(sources, targets, &start.steps);
+        source_values.clear();
+        source_values.resize(sources, 0.0);
+        for values in [&mut *target_values, &mut *allowed] {
+            values.clear();
+            values.resize(matrix.stride(), [0.0; LANES]);
+        }
+        let tolerance = PRICE_TOLERANCE * matrix.largest();
+        let mut pivots_left = MOST_PIVOTS_PER_POINT * (sources + targets);
+        let cost = |source, target| matrix.at(source, target);
+        tree.potentials(cost, source_values, target_values.as_flattened_mut());
+        loop {
+            if !pivot_until_priced(tree, matrix, tolerance, &mut pivots_left, source_values, target_values) {
+                return false;
+            }
+            tree.potentials(cost, source_values, target_values.as_flattened_mut());
+            target_duals_for(matrix, source_values, allowed);
+            let (values, allowed) = (target_values.as_flattened(), allowed.as_flattened());
+            if (0..targets).all(|j| allowed[j] >= values[j] - tolerance) {
+                break;
+            }
+        }
+        plan.restart();
+        tree.for_each_edge(|source, target, grains| plan.push(self.units, source, target, grains));
+        plan.price(self.problem, self.cost);
+        plan.offer(self.problem, self.cost, source_values, allowed.as_flattened());
+        true
+    }
+}
+
+/// Pivots until every row in a round is priced right; false if the pivots ran out.
+fn pivot_until_priced<const W: usize>(
+    tree: &mut Tree<W>,
+    matrix: &CostMatrix,
+    tolerance: f64,
+    pivots_left: &mut usize,
+    source_values: &mut [f64],
+    target_values: &mut [[f64; LANES]],
+) -> bool {
+    let rows = source_values.len();
+    let mut source = 0;
+    let mut right_in_turn = 0;
+    while right_in_turn < rows {
+        let row = matrix.row(source);
+        let minimum = row_minimum(row, target_values);
+        let reduced = minimum - source_values[source];
+        if reduced < -tolerance {
+            if *pivots_left == 0 {
+                return false;
+            }
+            *pivots_left -= 1;
+            right_in_turn = 0;
+            let target = column_of(row, target_values, minimum);
+            let swing = tree.pivot(source, target);
+            // The entering edge becomes tight: its moved end takes the whole reduced cost.
+            let step = if swing.with_source { reduced } else { -reduced };
+            let target_values = target_values.as_flattened_mut();
+            for_each_point(&swing.moved.sources, |i| source_values[i] += step);
+            for_each_point(&swing.moved.targets, |j| target_values[j] -= step);
+        } else {
+            right_in_turn += 1;
+        }
+        source += 1;
+        if source == rows {
+            source = 0;
+        }
+    }
+    true
+}

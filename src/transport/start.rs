@@ -1,0 +1,152 @@
+//! A feasible basis to begin with, or to make do with: cheapest target first, source by source.
+//!
+//! Costs are judged after subtracting each target's mean cost, a first guess of its dual: a target far from everybody
+//! is then not shunned until only bad offers are left. Every step empties a source or fills a target, so the steps are
+//! the edges of a spanning tree, listed from the leaves up: each closes a point, whose parent is the other end.
+
+use super::cost::{CostMatrix, LANES};
+use super::units::Units;
+use super::vertex::Flow;
+
+/// A step of the start: a point is done with, and what flows between it and a point that is not yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Closing {
+    /// A source is empty.
+    Source {
+        /// The source.
+        closed: usize,
+        /// The target of its last flow.
+        parent: usize,
+        /// That flow.
+        grains: i64,
+    },
+    /// A target is full.
+    Target {
+        /// The target.
+        closed: usize,
+        /// The source of its last flow.
+        parent: usize,
+        /// That flow.
+        grains: i64,
+    },
+}
+
+/// The cheapest column of a row after subtracting the column's value.
+#[inline]
+pub(super) fn row_minimum(row: &[[f64; LANES]], values: &[[f64; LANES]]) -> f64 {
+    let mut least = [f64::INFINITY; LANES];
+    for (costs, values) in row.iter().zip(values) {
+        for lane in 0..LANES {
+            let reduced = costs[lane] - values[lane];
+            least[lane] = if reduced < least[lane] { reduced } else { least[lane] };
+        }
+    }
+    let mut smallest = least[0];
+    for &value in &least[1..] {
+        smallest = if value < smallest { value } else { smallest };
+    }
+    smallest
+}
+
+/// The first column that attains a row's minimum.
+#[inline]
+pub(super) fn column_of(row: &[[f64; LANES]], values: &[[f64; LANES]], minimum: f64) -> usize {
+    for (block, (costs, values)) in row.iter().zip(values).enumerate() {
+        let mut hit = false;
+        for lane in 0..LANES {
+            hit |= costs[lane] - values[lane] == minimum;
+        }
+        if hit {
+            let lane = (0..LANES).find(|&lane| costs[lane] - values[lane] == minimum);
+            return block * LANES + lane.unwrap_or(0);
+        }
+    }
+    0
+}
+
+/// The memory of a start.
+#[derive(Clone, Debug, Default)]
+pub(super) struct StartMemory {
+    /// The steps, from the leaves up. The last one closes the last source onto the last open target.
+    pub steps: Vec<Closing>,
+    values: Vec<[f64; LANES]>,
+    left: Vec<i64>,
+}
+
+impl StartMemory {
+    /// Potentials under which all steps' pairs are tight.
+    pub(super) fn tree_duals(&self, matrix: &CostMatrix, source_duals: &mut [f64], target_duals: &mut [[f64; LANES]]) {
+        let target_duals = target_duals.as_flattened_mut();
+        for (k, &step) in self.steps.iter().rev().enumerate() {
+            match step {
+                Closing::Source { closed, parent, .. } => {
+                    if k == 0 {
+                        target_duals[parent] = 0.0;
+                    }
+                    source_duals[closed] = matrix.at(closed, parent) - target_duals[parent];
+                }
+                Closing::Target { closed, parent, .. } => {
+                    target_duals[closed] = matrix.at(parent, closed) - source_duals[parent];
+                }
+            }
+        }
+    }
+}
+
+/// The steps as flows, in their order.
+pub(super) fn steps_as_flows(steps: &[Closing]) -> impl Iterator<Item = Flow> + '_ {
+    steps.iter().map(|&step| match step {
+        Closing::Source { closed, parent, grains } => Flow { source: closed, target: parent, grains },
+        Closing::Target { closed, parent, grains } => Flow { source: parent, target: closed, grains },
+    })
+}
+
+/// Each target's mean cost over the sources; 0 in the padding.
+pub(super) fn mean_costs(matrix: &CostMatrix, targets: usize, means: &mut [[f64; LANES]]) {
+    means.fill([0.0; LANES]);
+    let mut sources = 0.0;
+    for row in matrix.rows() {
+        sources += 1.0;
+        for (costs, sums) in row.iter().zip(&mut *means) {
+            for (cost, sum) in costs.iter().zip(sums) {
+                *sum += cost;
+            }
+        }
+    }
+    let share = 1.0 / sources;
+    for (target, mean) in means.as_flattened_mut().iter_mut().enumerate() {
+        // The padding costs infinity, and infinity less infinity is no number.
+        *mean = if target < targets { *mean * share } else { 0.0 };
+    }
+}
+
+/// Lists the steps of the start.
+pub(super) fn greedy_start(matrix: &CostMatrix, units: &Units, memory: &mut StartMemory) {
+    let StartMemory { steps, values, left } = memory;
+    let sources = units.supplies.len();
+    values.clear();
+    values.resize(matrix.stride(), [0.0; LANES]);
+    mean_costs(matrix, units.demands.len(), values);
+    left.clear();
+    left.extend_from_slice(&units.demands);
+    steps.clear();
+    let mut open = left.len();
+    for source in 0..sources {
+        let row = matrix.row(source);
+        let mut supply = units.supplies[source];
+        loop {
+            let target = column_of(row, values, row_minimum(row, values));
+            let demand = left[target];
+            // One target stays open to the end: it is the root, and takes what is left.
+            if open == 1 || supply < demand && source + 1 < sources {
+                left[target] = demand - supply;
+                steps.push(Closing::Source { closed: source, parent: target, grains: supply });
+                break;
+            }
+            supply -= demand;
+            open -= 1;
+            values.as_flattened_mut()[target] = f64::NEG_INFINITY;
+            steps.push(Closing::Target { closed: target, parent: source, grains: demand });
+        }
+    }
+}
