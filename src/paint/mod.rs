@@ -26,8 +26,8 @@ mod residuals;
 mod sparkle;
 mod validate;
 
-pub(crate) use angle::{QuickBracket, QuickGrid};
 pub use angle::{AngleGrid, AngleGridError, Bracket};
+pub(crate) use angle::{QuickBracket, QuickGrid};
 pub use box_color::mean_color;
 pub use coat::{Coat, fresnel, refract};
 pub use color_table::{ColorTable, ColorTableError};
