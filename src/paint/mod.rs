@@ -26,11 +26,11 @@ mod residuals;
 mod sparkle;
 mod validate;
 
-pub use angle::{AngleGrid, AngleGridError, Bracket};
 pub(crate) use angle::{QuickBracket, QuickGrid};
-pub use box_color::mean_color;
+pub use angle::{AngleGrid, AngleGridError, Bracket};
+pub use box_color::{center_of_mean, mean_color};
 pub use coat::{Coat, fresnel, refract};
-pub use color_table::{ColorTable, ColorTableError};
+pub use color_table::{ColorTable, ColorTableError, at_angles};
 pub use container::{Container, ContainerError, Reader, Writer};
 pub use direction::{ASPECULAR_DEG, Direction, HalfAngles, half_angles, instrument_pairs};
 pub use energy::{EnergyCertificate, certify};

@@ -39,6 +39,15 @@ pub struct RandomTexture {
 }
 
 impl RandomTexture {
+    /// Texels along a side of the tile that pictures and bundles share.
+    pub const TILE: u32 = 256;
+
+    /// The tile of these flakes: the one that pictures draw and bundles carry.
+    #[must_use]
+    pub fn of(texture: &FlakeTexture) -> Self {
+        Self::new(Self::TILE, Self::TILE, cell_spacing(texture.grain_um / texture.texel_um), 1)
+    }
+
     /// A tile of `width x height` texels whose cells are `spacing` texels apart (see [`cell_spacing`]).
     ///
     /// Sizes are at least 1; the same arguments give the same tile on every machine.
@@ -227,6 +236,12 @@ impl<'a> FlakeSampler<'a> {
             boxes: boxes.collect(),
             to_rgb: [column([D65_2.x, 0.0, 0.0]), column([0.0, D65_2.y, 0.0]), column([0.0, 0.0, D65_2.z])],
         }
+    }
+
+    /// Cumulative probabilities of all clusters, slice by slice, as draws compare them.
+    #[must_use]
+    pub fn cumulative(&self) -> &[f32] {
+        &self.cumulative
     }
 
     /// Size and persistence of these flakes.

@@ -198,7 +198,7 @@ impl CoatKernel {
 
     #[allow(clippy::cast_possible_truncation)]
     fn new(coat: &Coat) -> Self {
-        if coat.ior < Coat::MIN_IOR {
+        if coat.ior <= 1.0 {
             return Self::ABSENT;
         }
         let (ior, roughness, mirror) = (coat.ior as f32, coat.roughness as f32, coat.is_mirror());

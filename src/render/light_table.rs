@@ -8,7 +8,7 @@
 use std::f32::consts::{PI, TAU};
 
 use super::environment::{Environment, Map, Source, luminance};
-use super::vector::{Vec3, scale};
+use super::vector::Vec3;
 
 /// One drawn direction.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +58,8 @@ impl LightTable {
             .map(|(k, p)| (1.0 - UNIFORM_SHARE) * p / total + UNIFORM_SHARE * share(k / width))
             .collect();
         let sphere = 4.0 * std::f64::consts::PI;
-        let density = probability.iter().enumerate().map(|(k, p)| (p / (share(k / width) * sphere)) as f32).collect();
+        let density =
+            probability.iter().enumerate().map(|(k, p)| (p / (share(k / width) * sphere)) as f32).collect();
         let mut table = Self { width, height, density, samples: Vec::new() };
         table.draw(environment, &probability);
         Some(table)

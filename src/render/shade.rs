@@ -54,10 +54,7 @@ impl<'a> Shader<'a> {
             let t = &flakes.texture;
             #[allow(clippy::cast_possible_truncation)] // pixels are f32
             let texels_per_unit = (scene.object_mm * 500.0 / t.texel_um) as f32;
-            Texture {
-                tile: RandomTexture::new(TILE, TILE, cell_spacing(t.grain_um / t.texel_um), scene.seed),
-                texels_per_unit,
-            }
+            Texture { tile: RandomTexture::new(TILE, TILE, cell_spacing(t.grain_um / t.texel_um), scene.seed), texels_per_unit }
         });
         let shader = Self {
             scene,
@@ -120,10 +117,7 @@ impl<'a> Shader<'a> {
             let light = frame.local(towards);
             if light[2] > 0.0 {
                 let (f, _) = self.kernel.evaluate::<COATED, FLAKES>(&view, light, cell);
-                sum = add(
-                    sum,
-                    [f[0] * irradiance[0] * light[2], f[1] * irradiance[1] * light[2], f[2] * irradiance[2] * light[2]],
-                );
+                sum = add(sum, [f[0] * irradiance[0] * light[2], f[1] * irradiance[1] * light[2], f[2] * irradiance[2] * light[2]]);
             }
         }
         let Some(table) = &self.light_table else { return sum };

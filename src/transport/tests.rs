@@ -16,7 +16,9 @@ fn closed_form(source: &[(f64, f64)], target: &[(f64, f64)], power: i32) -> f64 
         let mut cloud = cloud.to_vec();
         cloud.sort_by(|a, b| a.0.total_cmp(&b.0));
         let sum: f64 = cloud.iter().map(|point| point.1).sum();
-        cloud.iter_mut().for_each(|point| point.1 /= sum);
+        for point in &mut cloud {
+            point.1 /= sum;
+        }
         cloud
     };
     let (mut from, mut to) = (sorted(source), sorted(target));
@@ -153,6 +155,30 @@ fn clouds_of_every_tree_width_are_solved() {
             .expect("solved");
         let want = closed_form(&source, &target, 2);
         assert!(close(plan.cost, want), "{size}: {} for {want}", plan.cost);
+    }
+}
+
+#[test]
+fn costs_grow_with_the_scale_from_atoms_to_galaxies() {
+    let scaled = |scale: f64| {
+        let cloud = |f: f64| -> Vec<([f64; 3], f64)> {
+            (1..=20)
+                .map(|i| {
+                    let at = |g: f64| (f64::from(i) * f * g).sin() * scale;
+                    ([at(1.0), at(2.0), at(3.0)], f64::from(i))
+                })
+                .collect()
+        };
+        problem(&cloud(0.7), &cloud(1.1))
+    };
+    for (cost, power) in [(Cost::Distance, 1), (Cost::SquaredDistance, 2)] {
+        let one = exact(&scaled(1.0), cost);
+        for scale in [1e-60_f64, 1e-12, 1e12, 1e99] {
+            let plan = exact(&scaled(scale), cost);
+            let factor = scale.powi(power);
+            assert!(close(plan.cost / factor, one.cost), "{scale:e}: {}", plan.cost);
+            assert!(plan.gap / factor <= 1e-9 * one.cost, "{scale:e}: {:e}", plan.gap);
+        }
     }
 }
 

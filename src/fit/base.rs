@@ -1,0 +1,341 @@
+//! The base of a paint from a measured reflectance: shape first, then color, with or without a coat of its own.
+//!
+//! The measurement is fitted bare and, where it was made in air, with an explicit coat. The coat is taken when it
+//! brings the result clearly nearer to the measurement, or when the bare fit misses its aim and the coat helps:
+//! a second, wide lobe must not become a coat for a per cent.
+
+use std::f64::consts::PI;
+
+use super::color_table::{Frame, fit_color_table};
+use super::directions::{Sample, TRUSTED_DEG, measure};
+use super::lobes::{CoatSearch, LOBES, Shape, fit_shape, unit_of};
+use super::residual::{Judge, Percentiles};
+use crate::color::LinearRgb;
+use crate::measurement::MeasuredBrdf;
+use crate::paint::{CarPaint, Chi, Coat, ColorTable, Direction, FitResiduals, Lobe, MAX_WEIGHT, Reflectance};
+
+/// Samples that the shape is fitted to.
+const SAMPLES: usize = 8000;
+/// Fewer samples than this say nothing about a dozen parameters.
+const LEAST_SAMPLES: usize = 200;
+/// What the logarithm of all errors together must fall by for a coat to be taken.
+const COAT_GAIN: f64 = 0.2;
+/// What it must fall by where the bare fit misses [`AIM`].
+const COAT_GAIN_IN_NEED: f64 = 0.03;
+/// Error against the floor that a fit aims at.
+const AIM: f64 = 1.2;
+
+/// What is known of the coat before the fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CoatChoice {
+    /// Measured in air; a coat is made explicit where that fits better.
+    ByResidual,
+    /// Measured in air, through a coat of this index; 1 is none.
+    Ior(f64),
+    /// Angles and values are those inside a coat of this index, which is not fitted; 1 where the paint has none.
+    Inside(f64),
+}
+
+/// A fitted base.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedBase {
+    /// Lambertian albedo.
+    pub diffuse: LinearRgb,
+    /// Lobes by ascending roughness.
+    pub lobes: Vec<Lobe>,
+    /// Color by angle.
+    pub color_table: ColorTable,
+    /// The coat that was made explicit; never one under [`CoatChoice::Inside`].
+    pub coat: Option<Coat>,
+    /// Distance from the measurement, and the floor.
+    pub residuals: FitResiduals,
+    /// What a reader of the paint should know.
+    pub warnings: Vec<String>,
+}
+
+/// Why a measurement has no fit.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// An index out of range.
+    #[error("the coat's index of refraction is {0}, accepted is 1 to 4")]
+    Ior(f64),
+    /// Too few valid values.
+    #[error("{found} of {asked} sampled directions hold a valid value, a fit needs {needed}")]
+    TooFewSamples {
+        /// Valid samples.
+        found: usize,
+        /// Samples asked for.
+        asked: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// Nothing above zero.
+    #[error("no sampled direction reflects any light")]
+    Dark,
+    /// Values that no reflectance takes.
+    #[error("{field} would be {value:e}, accepted is up to 1000: the measurement is not in 1/sr")]
+    NotAReflectance {
+        /// Parameter of the fit.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The descent found no finite answer.
+    #[error("no start of the fit ended in a finite answer")]
+    NoAnswer,
+}
+
+/// One way to explain the measurement.
+struct Candidate {
+    shape: Shape,
+    table: ColorTable,
+    mapped: usize,
+    /// Errors of the fit and of its lobes alone, over the floor's: lower is better.
+    score: f64,
+    /// Worst error away from the mirror over the floor's.
+    worst: f64,
+}
+
+/// Fits diffuse, lobes, color table and, where asked for, the coat of a measured reflectance.
+///
+/// # Errors
+///
+/// [`FitError`] for an index out of range, a measurement with too few valid values or no light at all, and one whose
+/// values are no reflectance.
+pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedBase, FitError> {
+    let (frame, searches) = match coat {
+        CoatChoice::ByResidual => (Frame::Air, vec![CoatSearch::Bare, CoatSearch::Free]),
+        CoatChoice::Ior(ior) | CoatChoice::Inside(ior) if !(1.0..=4.0).contains(&ior) => {
+            return Err(FitError::Ior(ior));
+        }
+        CoatChoice::Ior(ior) if ior == 1.0 => (Frame::Air, vec![CoatSearch::Bare]),
+        CoatChoice::Ior(ior) => (Frame::Air, vec![CoatSearch::Index(ior)]),
+        CoatChoice::Inside(ior) => (Frame::Inside(ior), vec![CoatSearch::Bare]),
+    };
+    // Inside a coat light never leaves the cone of total reflection.
+    let cone = match frame {
+        Frame::Inside(ior) if ior > 1.0 => (1.0 / ior).asin().to_degrees() + 5.0,
+        _ => TRUSTED_DEG,
+    };
+    let samples = measure(measured, SAMPLES, cone.min(TRUSTED_DEG), 0xBA5E);
+    if samples.len() < LEAST_SAMPLES {
+        return Err(FitError::TooFewSamples { found: samples.len(), asked: SAMPLES, needed: LEAST_SAMPLES });
+    }
+    if !samples.iter().any(|s| s.luminance > 0.0) {
+        return Err(FitError::Dark);
+    }
+    let unit = unit_of(&samples);
+    let judge = Judge::new(measured, frame, unit);
+    let floors = judge.floor_errors();
+    let mut candidates = Vec::new();
+    for search in searches {
+        let Some(shape) = fit_shape(&samples, search, unit) else { continue };
+        candidates.push(candidate(measured, frame, shape, &samples, unit, &judge, &floors));
+    }
+    let mut candidates = candidates.into_iter();
+    let mut best = candidates.next().ok_or(FitError::NoAnswer)?;
+    for other in candidates {
+        let gain = best.score - other.score;
+        if gain > COAT_GAIN || (best.worst > AIM && gain > COAT_GAIN_IN_NEED) {
+            best = other;
+        }
+    }
+    finish(best, &judge)
+}
+
+fn candidate(
+    measured: &dyn MeasuredBrdf,
+    frame: Frame,
+    shape: Shape,
+    samples: &[Sample],
+    unit: f64,
+    judge: &Judge,
+    floors: &[Percentiles; 2],
+) -> Candidate {
+    let fitted = fit_color_table(measured, &shape, frame, samples, unit);
+    let paint = paint_of(&shape, fitted.table.clone());
+    let reflectance = Reflectance::new(&paint);
+    let with = |chi: Chi| judge.luminance_errors(|wi: Direction, wo: Direction| reflectance.evaluate(wi, wo, chi));
+    let (full, alone) = (with(Chi::Table), with(Chi::Overall));
+    // A floor of nothing (computed data) must not make every error infinite.
+    let over = |e: f64, f: f64| (e + 1e-3) / (f + 1e-3);
+    let ratios = [
+        over(full[0].median, floors[0].median),
+        over(full[0].p90, floors[0].p90),
+        over(full[1].median, floors[1].median),
+        over(full[1].p90, floors[1].p90),
+        over(alone[0].median, floors[0].median),
+        over(alone[0].p90, floors[0].p90),
+    ];
+    let score = ratios.iter().map(|r| r.ln()).sum::<f64>() / 6.0;
+    // The lobes alone may err twice and one and a half times as much.
+    let worst = ratios[0].max(ratios[1]).max(AIM * ratios[4] / 1.9).max(AIM * ratios[5] / 1.4);
+    Candidate { shape, table: fitted.table, mapped: fitted.mapped, score, worst }
+}
+
+fn paint_of(shape: &Shape, color_table: ColorTable) -> CarPaint {
+    let lobe = |&(s, alpha, f0): &(f64, f64, f64)| Lobe { weight: [s; 3], alpha, f0 };
+    CarPaint {
+        coat: shape.coat.map(|(ior, roughness)| Coat { ior, roughness, thickness_um: None }),
+        diffuse: [shape.diffuse; 3],
+        lobes: shape.lobes.iter().map(lobe).collect(),
+        color_table,
+        flakes: None,
+    }
+}
+
+fn finish(best: Candidate, judge: &Judge) -> Result<FittedBase, FitError> {
+    let mut shape = best.shape;
+    for (field, value) in [("diffuse", shape.diffuse)].into_iter().chain(shape.lobes.map(|l| ("a lobe's weight", l.0))) {
+        if !(0.0..=MAX_WEIGHT).contains(&value) {
+            return Err(FitError::NotAReflectance { field, value });
+        }
+    }
+    drop_what_does_not_show(&mut shape);
+    let mut warnings = Vec::new();
+    if shape.agreeing < 2 {
+        warnings.push(format!(
+            "only one of {} starts of the fit reached its result: other lobes may explain the measurement as well",
+            shape.starts
+        ));
+    }
+    if best.mapped > 0 {
+        warnings.push(format!(
+            "{} colors of the color table lay outside sRGB and became the nearest color inside",
+            best.mapped
+        ));
+    }
+    let paint = paint_of(&shape, best.table);
+    let reflectance = Reflectance::new(&paint);
+    let residuals = judge.residuals(|wi, wo| reflectance.evaluate(wi, wo, Chi::Table));
+    let all = &residuals.all;
+    if all.median > 1.3 * all.floor_median + 1e-3 || all.p90 > 1.3 * all.floor_p90 + 1e-3 {
+        warnings.push(format!(
+            "the fit errs by {:.1} % (median) and {:.1} % (90th percentile), a free function of the half angles by {:.1} % \
+             and {:.1} %",
+            100.0 * all.median, 100.0 * all.p90, 100.0 * all.floor_median, 100.0 * all.floor_p90
+        ));
+    }
+    let CarPaint { coat, diffuse, lobes, color_table, .. } = paint;
+    Ok(FittedBase { diffuse, lobes, color_table, coat, residuals, warnings })
+}
+
+/// Lobes that nowhere reach a ten-thousandth of the rest's peak get weight 0.
+fn drop_what_does_not_show(shape: &mut Shape) {
+    // At grazing the Fresnel value goes to 1, whatever it is at normal incidence.
+    let peaks = shape.lobes.map(|(s, alpha, _)| s / (PI * alpha * alpha));
+    let total = shape.diffuse / PI + peaks.iter().sum::<f64>();
+    for k in 0..LOBES {
+        if peaks[k] < 1e-4 * (total - peaks[k]) {
+            shape.lobes[k].0 = 0.0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paint::half_angles;
+
+    struct From<F: Fn(Direction, Direction) -> Option<LinearRgb> + Sync>(F);
+
+    impl<F: Fn(Direction, Direction) -> Option<LinearRgb> + Sync> MeasuredBrdf for From<F> {
+        fn reflectance(&self, wi: Direction, wo: Direction) -> Option<LinearRgb> {
+            (self.0)(wi, wo)
+        }
+    }
+
+    /// A number in 0..1 that depends on both directions and nothing else.
+    fn noise(wi: Direction, wo: Direction) -> f64 {
+        let bits = wi.iter().chain(&wo).fold(0_u64, |h, v| (h ^ v.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29));
+        f64::from(u32::try_from(bits >> 40).expect("24 bits")) / f64::from(1_u32 << 24)
+    }
+
+    fn satin(wi: Direction, wo: Direction) -> LinearRgb {
+        let h = half_angles(wi, wo);
+        let peak = 2.0 * (-h.tan2_h / 0.04).exp() / (wi[2] * wo[2]).max(0.1);
+        [0.05 + peak, 0.03 + 0.8 * peak, 0.02 + 0.5 * peak]
+    }
+
+    fn peak_and_flop(base: &FittedBase) -> [f64; 2] {
+        let paint = CarPaint {
+            coat: base.coat, diffuse: base.diffuse, lobes: base.lobes.clone(),
+            color_table: base.color_table.clone(), flakes: None,
+        };
+        let r = Reflectance::new(&paint);
+        let at = |deg: f64| {
+            let a = deg.to_radians();
+            crate::color::luminance(r.evaluate([-0.5, 0.0, 0.75_f64.sqrt()], [a.sin(), 0.0, a.cos()], Chi::Table))
+        };
+        [at(30.0), at(-20.0)]
+    }
+
+    #[test]
+    fn flat_data_give_a_diffuse_paint() {
+        let base = fit_base(&From(|_, _| Some([0.1, 0.2, 0.3])), CoatChoice::ByResidual).expect("a fit");
+        assert!(base.coat.is_none(), "{base:?}");
+        assert!(base.residuals.all.p90 < 5e-3, "{:?}", base.residuals);
+        assert!(base.residuals.instrument.iter().all(|i| i.fit < 0.1), "{:?}", base.residuals);
+    }
+
+    #[test]
+    fn invalid_entries_and_an_outlier_hardly_matter() {
+        let clean = fit_base(&From(|i, o| Some(satin(i, o))), CoatChoice::Ior(1.0)).expect("a fit");
+        for share in [0.03, 0.5] {
+            let holes = From(move |i, o| (noise(i, o) > share).then(|| satin(i, o)));
+            let base = fit_base(&holes, CoatChoice::Ior(1.0)).expect("a fit");
+            for (a, b) in peak_and_flop(&base).iter().zip(peak_and_flop(&clean)) {
+                assert!((a / b - 1.0).abs() < 0.05, "{share}: {a} {b}");
+            }
+        }
+        let spoiled = From(|i, o| {
+            let factor = if noise(i, o) < 0.01 { 100.0 } else { 1.0 };
+            Some(satin(i, o).map(|v| v * factor))
+        });
+        let base = fit_base(&spoiled, CoatChoice::Ior(1.0)).expect("a fit");
+        for (a, b) in peak_and_flop(&base).iter().zip(peak_and_flop(&clean)) {
+            assert!((a / b - 1.0).abs() < 0.05, "outliers: {a} {b}");
+        }
+    }
+
+    #[test]
+    fn a_million_times_darker_is_the_same_fit_and_brighter_is_no_reflectance() {
+        let clean = fit_base(&From(|i, o| Some(satin(i, o))), CoatChoice::Ior(1.0)).expect("a fit");
+        let dim = fit_base(&From(|i, o| Some(satin(i, o).map(|v| v * 1e-6))), CoatChoice::Ior(1.0)).expect("a fit");
+        for (a, b) in peak_and_flop(&dim).iter().zip(peak_and_flop(&clean)) {
+            assert!((1e6 * a / b - 1.0).abs() < 0.05, "{a} {b}");
+        }
+        let bright = fit_base(&From(|i, o| Some(satin(i, o).map(|v| v * 1e6))), CoatChoice::Ior(1.0));
+        assert!(matches!(bright, Err(FitError::NotAReflectance { .. })), "{bright:?}");
+    }
+
+    #[test]
+    fn nothing_to_fit_is_refused_by_name() {
+        assert!(matches!(fit_base(&From(|_, _| None), CoatChoice::ByResidual), Err(FitError::TooFewSamples { found: 0, .. })));
+        assert_eq!(fit_base(&From(|_, _| Some([0.0; 3])), CoatChoice::ByResidual), Err(FitError::Dark));
+        assert_eq!(fit_base(&From(|_, _| Some([0.1; 3])), CoatChoice::Ior(0.5)), Err(FitError::Ior(0.5)));
+        let few = From(|i: Direction, o| (noise(i, o) < 1e-3).then_some([0.1; 3]));
+        assert!(matches!(fit_base(&few, CoatChoice::ByResidual), Err(FitError::TooFewSamples { needed: 200, .. })));
+    }
+
+    #[test]
+    fn a_mirror_ends_in_a_finite_answer() {
+        let mirror = From(|i, o| {
+            let h = half_angles(i, o);
+            Some(if h.theta_h < 0.01 { [3000.0; 3] } else { [0.0; 3] })
+        });
+        let base = fit_base(&mirror, CoatChoice::ByResidual).expect("a fit");
+        let [peak, flop] = peak_and_flop(&base);
+        assert!(peak.is_finite() && flop.is_finite() && flop < 0.1, "{peak} {flop}");
+    }
+
+    #[test]
+    fn the_number_of_threads_changes_no_bit() {
+        let fit = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(|| fit_base(&From(|i, o| Some(satin(i, o).map(|v| v * (0.8 + 0.4 * noise(i, o))))), CoatChoice::ByResidual))
+        };
+        assert_eq!(fit(1).expect("a fit"), fit(3).expect("a fit"));
+    }
+}
