@@ -15,6 +15,7 @@ mod docs;
 mod documents;
 mod envelope;
 mod extract;
+mod home;
 mod ids;
 mod jobs;
 mod metrics;

@@ -1,7 +1,6 @@
 //! The documentation: `/openapi.json`, a page that shows it without the internet, and what each problem means.
 
 use axum::http::{HeaderName, header};
-use axum::response::Redirect;
 use utoipa::OpenApi;
 
 use super::answer::{Answer, Keep};
@@ -60,11 +59,6 @@ pub fn interface() -> String {
 /// `/openapi.json`
 pub async fn openapi() -> Answer {
     Answer::bytes("application/json", interface(), Keep::Revalidated)
-}
-
-/// `/`
-pub async fn home() -> Redirect {
-    Redirect::temporary("/docs")
 }
 
 /// `/docs`
