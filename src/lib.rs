@@ -17,5 +17,7 @@ pub mod fit;
 pub mod measurement;
 pub mod paint;
 pub mod render;
+pub mod service;
+pub mod store;
 pub mod transport;
 pub mod workshop;

@@ -30,8 +30,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
 ];
 
 /// Rooms that compute and nothing else, and what would make them impure.
-const PURE: &[&str] =
-    &["color", "transport", "paint", "measurement", "fit", "blend", "render", "export", "accuracy"];
+const PURE: &[&str] = &["color", "transport", "paint", "measurement", "fit", "blend", "render", "export", "accuracy"];
 const IMPURE: &[&str] = &["tokio::", "axum::", "std::time::", "std::env::", "rand::rng", "thread_rng"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

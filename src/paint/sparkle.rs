@@ -1,11 +1,9 @@
-//! The random texture: which flake a texel of the paint shows.
+//! Which flake a texel of the paint shows.
 //!
-//! A texel carries one 32-bit number that it shares with its *cell*, the nearest of the jittered points of a grid
-//! (a Voronoi cell about a flake wide). Two texels therefore show the same flake with the probability that they share a
-//! cell, whatever the histogram: the texels' autocorrelation is the paint's grain. The number is hashed with two
-//! *epochs*, `floor(θ/persistence + phase)` with a phase per cell: the probability that a cell still shows the same
-//! flake after `Δθ` is `1 − Δθ/persistence`, which gives the lifetime. From the hash come the number that picks a
-//! cluster by cumulative probability, and three that place the color in its box.
+//! A texel carries the number of its cell ([`RandomTexture`](super::RandomTexture)). It is hashed with two *epochs*,
+//! `floor(θ/persistence + phase)` with a phase per cell: the probability that a cell still shows the same flake after
+//! `Δθ` is `1 − Δθ/persistence`, which gives the lifetime. From the hash come the number that picks a cluster by
+//! cumulative probability, and three that place the color in its box.
 //!
 //! All of it is 32-bit integer arithmetic, so that a shader draws the very same flakes. The mixing step is
 //! PCG-RXS-M-XS (M. O'Neill, 2014). Hash by the texel on the paint, never by the pixel or the frame.
@@ -29,133 +27,6 @@ pub(crate) fn unit(x: u32) -> f32 {
     let top = (x >> 8) as f32;
     (top + 0.5) / 16_777_216.0
 }
-
-/// A tile of cell numbers that repeats over the paint.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RandomTexture {
-    width: u32,
-    height: u32,
-    cells: Vec<u32>,
-}
-
-impl RandomTexture {
-    /// Texels along a side of the tile that pictures and bundles share.
-    pub const TILE: u32 = 256;
-
-    /// The tile of these flakes: the one that pictures draw and bundles carry.
-    #[must_use]
-    pub fn of(texture: &FlakeTexture) -> Self {
-        Self::new(Self::TILE, Self::TILE, cell_spacing(texture.grain_um / texture.texel_um), 1)
-    }
-
-    /// A tile of `width x height` texels whose cells are `spacing` texels apart (see [`cell_spacing`]).
-    ///
-    /// Sizes are at least 1; the same arguments give the same tile on every machine.
-    #[must_use]
-    pub fn new(width: u32, height: u32, spacing: f64, seed: u32) -> Self {
-        let grid = CellGrid::new(width.max(1), height.max(1), spacing, seed);
-        let cells = (0..grid.height).flat_map(|y| (0..grid.width).map(move |x| (x, y)));
-        Self { width: grid.width, height: grid.height, cells: cells.map(|(x, y)| grid.cell_of(x, y)).collect() }
-    }
-
-    /// Texels across.
-    #[must_use]
-    pub const fn width(&self) -> u32 {
-        self.width
-    }
-
-    /// Texels down.
-    #[must_use]
-    pub const fn height(&self) -> u32 {
-        self.height
-    }
-
-    /// The numbers, row by row.
-    #[must_use]
-    pub fn cells(&self) -> &[u32] {
-        &self.cells
-    }
-
-    /// Number of a texel anywhere on the paint. Every repetition of the tile gets numbers of its own.
-    #[must_use]
-    pub fn at(&self, x: i32, y: i32) -> u32 {
-        let (w, h) = (self.width.cast_signed(), self.height.cast_signed());
-        let (tile_x, tile_y) = (x.div_euclid(w), y.div_euclid(h));
-        let inside = y.rem_euclid(h) * w + x.rem_euclid(w);
-        let cell = self.cells[inside.cast_unsigned() as usize];
-        if (tile_x, tile_y) == (0, 0) {
-            return cell;
-        }
-        mix(cell ^ mix(tile_x.cast_unsigned().wrapping_add(mix(tile_y.cast_unsigned()))))
-    }
-}
-
-struct CellGrid {
-    width: u32,
-    height: u32,
-    columns: u32,
-    rows: u32,
-    step: [f64; 2],
-    seed: u32,
-}
-
-impl CellGrid {
-    fn new(width: u32, height: u32, spacing: f64, seed: u32) -> Self {
-        // A whole number of cells across, so that the tile has no seam.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to 1..=8 per texel
-        let count = |size: u32| (f64::from(size) / spacing.max(0.125)).round().clamp(1.0, 8.0 * f64::from(size)) as u32;
-        let (columns, rows) = (count(width), count(height));
-        let step = [f64::from(width) / f64::from(columns), f64::from(height) / f64::from(rows)];
-        Self { width, height, columns, rows, step, seed }
-    }
-
-    fn cell_of(&self, x: u32, y: u32) -> u32 {
-        let (px, py) = ((f64::from(x) + 0.5) / self.step[0], (f64::from(y) + 0.5) / self.step[1]);
-        #[allow(clippy::cast_possible_truncation)] // a grid coordinate
-        let (cx, cy) = (px.floor() as i64, py.floor() as i64);
-        let (mut nearest, mut number) = (f64::INFINITY, 0);
-        for dy in -2..=2 {
-            for dx in -2..=2 {
-                let column = (cx + dx).rem_euclid(i64::from(self.columns));
-                let row = (cy + dy).rem_euclid(i64::from(self.rows));
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below columns * rows <= 2^32
-                let key = (row * i64::from(self.columns) + column) as u32;
-                let hash = mix(key ^ mix(self.seed));
-                #[allow(clippy::cast_precision_loss)] // small integers
-                let (sx, sy) = (
-                    (cx + dx) as f64 + f64::from(unit(mix(hash ^ 0x68bc_21eb))),
-                    (cy + dy) as f64 + f64::from(unit(mix(hash ^ 0x02e5_be93))),
-                );
-                let distance = ((sx - px) * self.step[0]).powi(2) + ((sy - py) * self.step[1]).powi(2);
-                if distance < nearest {
-                    (nearest, number) = (distance, hash);
-                }
-            }
-        }
-        number
-    }
-}
-
-/// Spacing of cells, in texels, whose autocorrelation falls to one half at `grain` texels.
-///
-/// Independent texels fall to one half at 0.5 texels (linear between lags 0 and 1); a grain below that is what
-/// independent texels give. Found by measuring tiles of many spacings; a test measures them again.
-#[must_use]
-pub fn cell_spacing(grain: f64) -> f64 {
-    let last = SPACING_OF_GRAIN.len() - 1;
-    if grain >= SPACING_OF_GRAIN[last].0 {
-        return grain * SPACING_OF_GRAIN[last].1 / SPACING_OF_GRAIN[last].0;
-    }
-    let above = SPACING_OF_GRAIN.partition_point(|&(g, _)| g <= grain);
-    if above == 0 {
-        return SPACING_OF_GRAIN[0].1;
-    }
-    let ((g0, s0), (g1, s1)) = (SPACING_OF_GRAIN[above - 1], SPACING_OF_GRAIN[above]);
-    s0 + (s1 - s0) * (grain - g0) / (g1 - g0)
-}
-
-/// (distance of half autocorrelation, spacing), both in texels, of tiles of 512 x 512.
-const SPACING_OF_GRAIN: [(f64, f64); 2] = [(0.5, 0.125), (4.0, 8.0)];
 
 /// The random numbers of one cell at one angle pair.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -28,7 +28,7 @@ impl Ground {
         }
         let directions: Vec<Vec3> = (0..256)
             .map(|k| {
-                let [u, v] = Points::of_pixel(0, 0, 0x6d).pair(k, 0);
+                let [u, v] = Points::of_pixel(0, 0, 256, 0x6d).pair(k, 0);
                 let (r, turn) = (u.sqrt(), v * std::f32::consts::TAU);
                 [r * turn.cos(), (1.0 - u).sqrt(), r * turn.sin()]
             })

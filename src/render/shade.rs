@@ -8,6 +8,7 @@ use super::effects::{Effect, EffectPlan};
 use super::environment::Source;
 use super::ground::Ground;
 use super::kernel::Kernel;
+use super::lanes::{self, Lanes, Lanes3, WIDTH, get, set, splat3};
 use super::light_table::LightTable;
 use super::points::Points;
 use super::scene::{Background, Scene};
@@ -36,6 +37,46 @@ struct Texture {
     texels_per_unit: f32,
 }
 
+/// Samples of a pixel that are shaded together.
+struct Batch {
+    count: usize,
+    index: [u32; WIDTH],
+    point: Lanes3,
+    normal: Lanes3,
+    tangent: Lanes3,
+    side: Lanes3,
+    eye: Lanes3,
+    cells: [u32; WIDTH],
+}
+
+impl Batch {
+    fn new() -> Self {
+        let zero = splat3([0.0; 3]);
+        let (x, y, z) = (splat3([1.0, 0.0, 0.0]), splat3([0.0, 1.0, 0.0]), splat3([0.0, 0.0, 1.0]));
+        Self { count: 0, index: [0; WIDTH], point: zero, normal: z, tangent: x, side: y, eye: z, cells: [0; WIDTH] }
+    }
+
+    fn push(&mut self, index: u32, hit: Hit, eye: Vec3, cell: u32) {
+        let (k, frame) = (self.count, Frame::new(hit.normal, eye));
+        self.index[k] = index;
+        set(&mut self.point, k, hit.point);
+        set(&mut self.normal, k, hit.normal);
+        set(&mut self.tangent, k, frame.tangent);
+        set(&mut self.side, k, frame.side);
+        set(&mut self.eye, k, eye);
+        self.cells[k] = cell;
+        self.count += 1;
+    }
+
+    /// World directions in the frames of the points.
+    fn local(&self, w: Lanes3) -> Lanes3 {
+        [lanes::dot(w, self.tangent), lanes::dot(w, self.side), lanes::dot(w, self.normal)]
+    }
+}
+
+/// Directions drawn from the environment per sample.
+const LIGHTS: u32 = 2;
+
 /// Rays of the camera.
 struct Lens {
     right: Vec3,
@@ -58,7 +99,7 @@ impl<'a> Shader<'a> {
         });
         let shader = Self {
             scene,
-            kernel: Kernel::new(paint, plan.has(Effect::Flakes)),
+            kernel: Kernel::new(paint),
             ground: Ground::new(&surface),
             surface,
             lights: scene.lights.iter().map(|light| (unit(light.towards), light.irradiance)).collect(),
@@ -81,66 +122,83 @@ impl<'a> Shader<'a> {
     }
 
     fn pixel_of<const COATED: bool, const FLAKES: bool>(&self, x: u32, y: u32) -> Vec3 {
-        let points = Points::of_pixel(x, y, self.scene.seed);
+        let count = self.scene.samples_per_pixel;
+        let points = Points::of_pixel(x, y, count, self.scene.seed);
         let origin = self.scene.camera.origin;
         let mut sum = [0.0; 3];
-        for index in 0..self.scene.samples_per_pixel {
+        let mut batch = Batch::new();
+        for index in 0..count {
             let (direction, place) = self.lens.ray(x, y, points.pair(index, 0));
-            let light = match self.surface.meet(origin, direction) {
-                Some(hit) => self.leaving::<COATED, FLAKES>(&hit, scale(direction, -1.0), points, index),
-                None => self.behind(origin, direction, place),
-            };
-            sum = add(sum, light);
+            match self.surface.meet(origin, direction) {
+                Some(hit) => {
+                    batch.push(index, hit, scale(direction, -1.0), self.cell::<FLAKES>(&hit));
+                    if batch.count == WIDTH {
+                        sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points));
+                        batch.count = 0;
+                    }
+                }
+                None => sum = add(sum, self.behind(origin, direction, place)),
+            }
+        }
+        if batch.count > 0 {
+            sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points));
         }
         #[allow(clippy::cast_precision_loss)] // a few thousand
-        scale(sum, 1.0 / self.scene.samples_per_pixel as f32)
+        scale(sum, 1.0 / count as f32)
     }
 
-    fn leaving<const COATED: bool, const FLAKES: bool>(
-        &self,
-        hit: &Hit,
-        towards_eye: Vec3,
-        points: Points,
-        index: u32,
-    ) -> Vec3 {
-        let frame = Frame::new(hit.normal, towards_eye);
-        let view = self.kernel.view::<COATED>(frame.local(towards_eye));
-        let cell = match &self.texture {
+    /// Number of the texel at a point.
+    fn cell<const FLAKES: bool>(&self, hit: &Hit) -> u32 {
+        match &self.texture {
             Some(texture) if FLAKES => {
                 let [x, y] = self.surface.texel(hit, texture.texels_per_unit);
                 texture.tile.at(x, y)
             }
             _ => 0,
+        }
+    }
+
+    /// Light that leaves the points of a batch, summed.
+    fn leaving<const COATED: bool, const FLAKES: bool>(&self, batch: &Batch, points: Points) -> Vec3 {
+        let view = self.kernel.view::<COATED>(batch.local(batch.eye));
+        let mut sum = [Lanes::splat(0.0); 3];
+        let mut shine = |light: Lanes3, power: Lanes3| {
+            let answer = self.kernel.evaluate::<COATED, FLAKES>(&view, light, &batch.cells);
+            let cosine = light[2].at_least(0.0);
+            sum = std::array::from_fn(|k| sum[k] + answer.f[k] * power[k] * cosine);
         };
-        let mut sum = [0.0; 3];
         for &(towards, irradiance) in &self.lights {
-            let light = frame.local(towards);
-            if light[2] > 0.0 {
-                let (f, _) = self.kernel.evaluate::<COATED, FLAKES>(&view, light, cell);
-                sum = add(sum, [f[0] * irradiance[0] * light[2], f[1] * irradiance[1] * light[2], f[2] * irradiance[2] * light[2]]);
+            let light = batch.local(splat3(towards));
+            if light[2].0.iter().any(|&z| z > 0.0) {
+                shine(light, splat3(irradiance));
             }
         }
-        let Some(table) = &self.light_table else { return sum };
-
-        let drawn = table.sample(points.pair(index, 1));
-        let light = frame.local(drawn.direction);
-        if light[2] > 0.0 {
-            let (f, density) = self.kernel.evaluate::<COATED, FLAKES>(&view, light, cell);
-            sum = gather(sum, f, drawn.radiance, light[2] / (drawn.density + density));
+        if let Some(table) = &self.light_table {
+            let facing: [usize; WIDTH] = std::array::from_fn(|k| table.facing(get(&batch.normal, k)));
+            for draw in 0..LIGHTS {
+                let (mut directions, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
+                let mut density = Lanes::splat(1.0);
+                for k in 0..WIDTH {
+                    let drawn = table.sample(facing[k], points.pair(batch.index[k] * LIGHTS + draw, 1));
+                    set(&mut directions, k, drawn.direction);
+                    set(&mut power, k, drawn.light);
+                    density.0[k] = drawn.density;
+                }
+                #[allow(clippy::cast_precision_loss)] // a few
+                let power = power.map(|v| v * (1.0 / LIGHTS as f32));
+                shine(batch.local(directions), power);
+            }
         }
-        let pick = points.pair(index, 3)[0];
-        if let Some(light) = self.kernel.sample::<COATED>(&view, pick, points.pair(index, 2)) {
-            let direction = frame.world(light);
-            let (f, density) = self.kernel.evaluate::<COATED, FLAKES>(&view, light, cell);
-            let radiance = self.scene.environment.radiance(direction);
-            sum = gather(sum, f, radiance, light[2] / (table.density(direction) + density));
+        let mut light = [0.0; 3];
+        let mirror = if COATED { self.kernel.mirror(&view) } else { Lanes::splat(0.0) };
+        for k in 0..batch.count {
+            light = add(light, get(&sum, k));
+            if COATED && mirror.0[k] > 0.0 {
+                let direction = along(scale(get(&batch.normal, k), 2.0 * view.outer[2].0[k]), get(&batch.eye, k), -1.0);
+                light = along(light, self.around(get(&batch.point, k), direction), mirror.0[k]);
+            }
         }
-        let mirror = self.kernel.mirror(&view);
-        if COATED && mirror > 0.0 {
-            let direction = along(scale(hit.normal, 2.0 * view.outer[2]), towards_eye, -1.0);
-            sum = along(sum, self.around(hit.point, direction), mirror);
-        }
-        sum
+        light
     }
 
     /// What a mirror on the object sees.
@@ -171,10 +229,6 @@ fn sweep(place: [f32; 2], shade: f32) -> Vec3 {
     let out = (place[0] * place[0] * 0.7 + (place[1] - 0.15).powi(2)).sqrt();
     let light = 0.40 - 0.24 * smoothstep(0.0, 1.5, out) + 0.07 * smoothstep(-0.2, -1.0, place[1]);
     [light * (1.0 - 0.86 * shade); 3]
-}
-
-fn gather(sum: Vec3, f: Vec3, radiance: Vec3, weight: f32) -> Vec3 {
-    [sum[0] + f[0] * radiance[0] * weight, sum[1] + f[1] * radiance[1] * weight, sum[2] + f[2] * radiance[2] * weight]
 }
 
 impl Lens {

@@ -46,9 +46,9 @@ pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
 /// Right-handed axes at a surface point: `normal` is z, the view lies in the plane of x and z.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
-    tangent: Vec3,
-    side: Vec3,
-    normal: Vec3,
+    pub(super) tangent: Vec3,
+    pub(super) side: Vec3,
+    pub(super) normal: Vec3,
 }
 
 impl Frame {

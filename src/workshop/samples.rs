@@ -11,8 +11,7 @@
 
 use super::WorkshopError;
 use crate::accuracy::Profile;
-use crate::fit::{FlakeRecipe, simulate_flakes};
-use crate::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
+use crate::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance};
 
 /// One sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,5 +130,12 @@ impl Sample {
     pub fn base(&self) -> CarPaint {
         let lobes = (0..3).map(|k| Lobe { weight: self.weights[k], alpha: self.alpha[k], f0: self.f0[k] }).collect();
         CarPaint { coat: None, diffuse: self.diffuse, lobes, color_table: ColorTable::white(), flakes: None }
+    }
+}
+
+impl Sample {
+    /// The paint
+    pub fn build(&self, _profile: &Profile, _progress: &(dyn Fn(f32) + Sync)) -> Result<PaintFile, WorkshopError> {
+        Ok(super::ingest::finish(self.name.to_owned(), Provenance::default(), self.base(), None, None, Vec::new()))
     }
 }
