@@ -1,9 +1,11 @@
 //! Color clusters of a slice: at most n boxes in CIELAB that draw like its texels.
 //!
 //! A slice's texels are few bright ones over a dark crowd, and the bright ones are the sparkle. The brightest two dozen
-//! of 4096 texels get small clusters of their own (1, 1, 1, 1, 1, 1, 2, 2, 4 and 8 texels, in proportion for other
-//! sizes); the rest is split where the squared distance from the clusters' means is largest, at the mean of the axis
-//! that spreads most (a k-d tree by shares of the sum of squares). A leaf's box then follows one of two rules:
+//! of 4096 texels get small clusters of their own: 1, 1 and 1, then the 3 around the 99.9th percentile, where sparkle is
+//! judged, then 2, 2, 4 and 8, in proportion for other sizes. Where the cluster around the percentile holds few texels it
+//! is the color of its middle one: a step of the histogram there would make the percentile of any finite drawing jump.
+//! What that takes from the mean the brighter ones give back. The rest is split where the squared distance from the clusters' means is largest: at the mean of the axis that spreads most, or,
+//! along lightness, where the split lowers the sum of squares most. A leaf's box then follows one of two rules:
 //!
 //! - [`BoxRule::Moments`]: mean ± √3 σ on each axis, the uniform box of the members' variance, shifted so that its mean
 //!   in *linear light* is its members' ([`center_of_mean`]). Light adds in linear RGB: the slice's mean is kept exactly,
@@ -78,12 +80,14 @@ pub struct NoTexel {
     pub pixels: usize,
 }
 
-/// Sizes of the clusters of the brightest texels, of 4096; see the head of this file.
-const BRIGHTEST: [usize; 10] = [1, 1, 1, 1, 1, 1, 2, 2, 4, 8];
-/// Texels that [`BRIGHTEST`] is counted for.
-const OF_TEXELS: usize = 4096;
+/// Share of the brightest texels at which sparkle is judged: the 99.9th percentile.
+const SPARKLE: f64 = 1e-3;
 /// Share of the clusters that the brightest texels get.
 const BRIGHT_SHARE: usize = 5;
+/// Sizes of the clusters below the sparkle's, of 4096 texels.
+const BELOW_SPARKLE: [usize; 4] = [2, 2, 4, 8];
+/// Largest cluster that the sparkle is a single color in.
+const FLAT: usize = 8;
 /// Buckets of lightness that the crowd is sorted into.
 const BUCKETS: usize = 256;
 
@@ -160,6 +164,8 @@ pub struct Clusterer {
     texels: Vec<Texel>,
     sorted: Vec<Texel>,
     leaves: Vec<Node>,
+    /// Texels that are not among the brightest.
+    crowd: usize,
 }
 
 /// Sums over texels, around [`Clusterer`]'s origin.
@@ -233,9 +239,8 @@ impl Clusterer {
         }
         let most = settings.clusters.max(1);
         self.leaves.clear();
-        let crowd = self.take_brightest(most);
-        let left = most - self.leaves.len();
-        self.split_crowd(crowd, left.max(1));
+        self.crowd = self.take_brightest(most);
+        self.split_crowd(self.crowd, most - self.leaves.len());
         let mut clusters = self.boxes(planes, settings.box_rule);
         (clusters.dead, clusters.beyond) = (dead, beyond);
         Ok(clusters)
@@ -280,10 +285,9 @@ impl Clusterer {
     /// Moves the brightest texels behind the others, a leaf for each group; returns how many the others are.
     fn take_brightest(&mut self, most: usize) -> usize {
         let count = self.texels.len();
-        let groups = (most / BRIGHT_SHARE).min(BRIGHTEST.len());
-        let whole: usize = BRIGHTEST.iter().sum();
-        let taken = (count * whole + OF_TEXELS / 2) / OF_TEXELS;
-        if groups == 0 || taken == 0 || taken >= count {
+        let ends = bright_groups(count, most / BRIGHT_SHARE);
+        let taken = ends.last().copied().unwrap_or(0);
+        if taken == 0 || taken >= count {
             return count;
         }
         let by_lightness = |x: &Texel, y: &Texel| x[0].total_cmp(&y[0]).then(x[3].total_cmp(&y[3]));
@@ -291,14 +295,9 @@ impl Clusterer {
         self.texels.select_nth_unstable_by(crowd, by_lightness);
         self.texels[crowd..].sort_unstable_by(|x, y| by_lightness(y, x));
         let mut from = 0;
-        for group in 1..=groups {
-            // With fewer clusters neighbouring groups are one.
-            let sizes = BRIGHTEST[..group * BRIGHTEST.len() / groups].iter().sum::<usize>();
-            let to = (count * sizes + OF_TEXELS / 2) / OF_TEXELS;
-            if to > from {
-                self.leaves.push(Node::new(crowd + from, crowd + to, None, Sums::default()));
-                from = to;
-            }
+        for to in ends {
+            self.leaves.push(Node::new(crowd + from, crowd + to, None, Sums::default()));
+            from = to;
         }
         crowd
     }
@@ -372,14 +371,38 @@ impl Clusterer {
         (origin, starts, sums)
     }
 
+    /// The leaf around the 99.9th percentile, where it is small.
+    fn flat_leaf(&self) -> Option<usize> {
+        let sparkle = self.crowd + (SPARKLE * self.texels.len() as f64) as usize;
+        let small = |leaf: &Node| leaf.from <= sparkle && sparkle < leaf.to && leaf.to - leaf.from <= FLAT;
+        self.leaves.iter().position(small)
+    }
+
     /// The boxes of all leaves, lightest last.
     fn boxes(&self, planes: [&[f32]; 3], rule: BoxRule) -> SliceClusters {
         let mut boxes: Vec<(usize, [f32; 3], [f32; 3])> = Vec::with_capacity(self.leaves.len());
-        for leaf in &self.leaves {
+        let flat = self.flat_leaf();
+        let (mut owed, mut brighter) = ([0.0; 3], 0);
+        if let Some(flat) = flat {
+            let members = &self.texels[self.leaves[flat].from..self.leaves[flat].to];
+            let middle = linear(&members[members.len() / 2], planes);
+            for texel in members {
+                let own = linear(texel, planes);
+                (0..3).for_each(|k| owed[k] += own[k] - middle[k]);
+            }
+            brighter = self.leaves[flat].from - self.crowd;
+        }
+        for (number, leaf) in self.leaves.iter().enumerate() {
             let members = &self.texels[leaf.from..leaf.to];
             let (lower, upper) = match rule {
                 BoxRule::Tight => tight(members),
-                BoxRule::Moments => moments(members, planes),
+                BoxRule::Moments if Some(number) == flat && brighter > 0 => {
+                    moments(&members[members.len() / 2..][..1], planes, [0.0; 3])
+                }
+                BoxRule::Moments if flat.is_some_and(|flat| number < flat) => {
+                    moments(members, planes, owed.map(|o| o / brighter as f64))
+                }
+                BoxRule::Moments => moments(members, planes, [0.0; 3]),
             };
             boxes.push((members.len(), lower, upper));
         }
@@ -404,6 +427,26 @@ impl Clusterer {
             beyond: 0,
         }
     }
+}
+
+/// Ends of the groups of the brightest of `count` texels, brightest first, in at most `groups` groups.
+fn bright_groups(count: usize, groups: usize) -> Vec<usize> {
+    let rank = SPARKLE * (count as f64 - 1.0);
+    let (middle, reach) = (rank.round() as usize, (0.3 * rank).round() as usize);
+    let (from, to) = (middle - reach, middle + reach + 1);
+    let mut ends = match groups {
+        0..3 => Vec::new(),
+        3..6 => vec![from, to],
+        _ => vec![from / 3, from * 2 / 3, from, to],
+    };
+    for size in BELOW_SPARKLE.into_iter().take(groups.saturating_sub(ends.len())) {
+        if let Some(end) = ends.last().copied() {
+            ends.push(end + (count * size + 2048) / 4096);
+        }
+    }
+    ends.retain(|end| *end > 0);
+    ends.dedup();
+    ends
 }
 
 /// The node of a run of buckets.
@@ -461,7 +504,8 @@ fn tight(members: &[Texel]) -> ([f32; 3], [f32; 3]) {
     (lower, upper)
 }
 
-fn moments(members: &[Texel], planes: [&[f32]; 3]) -> ([f32; 3], [f32; 3]) {
+/// The box of the members' mean and variance, and of their mean in linear light plus `more`.
+fn moments(members: &[Texel], planes: [&[f32]; 3], more: LinearRgb) -> ([f32; 3], [f32; 3]) {
     let origin = members[0].map(f64::from);
     let (mut first, mut second, mut light) = ([0.0_f64; 3], [0.0_f64; 3], [0.0_f64; 3]);
     for texel in members {
@@ -482,7 +526,8 @@ fn moments(members: &[Texel], planes: [&[f32]; 3]) -> ([f32; 3], [f32; 3]) {
         // A box must not reach beyond the bounds, wherever its mean moves it.
         (3.0 * variance).sqrt().min((MAX_LAB - mean[k].abs()).max(0.0))
     });
-    let center = center_of_mean(half, light.map(|v| v / count), mean);
+    let light: LinearRgb = std::array::from_fn(|k| light[k] / count + more[k]);
+    let center = center_of_mean(half, light, mean);
     let bound = MAX_LAB as f32;
     let corner = |sign: f64| std::array::from_fn(|k| ((center[k] + sign * half[k]) as f32).clamp(-bound, bound));
     (corner(-1.0), corner(1.0))

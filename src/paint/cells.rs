@@ -5,7 +5,13 @@
 //! the probability that they share a cell, whatever the histogram, so the texels' autocorrelation is the paint's grain
 //! ([`cell_spacing`]). Within a bucket the places are free, or the buckets' grid would beat with the texels'.
 //!
-//! The numbers come from 32-bit integer hashing and the tile has no seam; a shader reads them from a texture.
+//! Numbers are dealt so that a tile keeps the histogram it draws: in random order every cell is given the middle of a
+//! piece of `0..2^32` as long as its area. The cells whose numbers lie in an interval then cover that share of the tile,
+//! not a share that scatters like a dice count, and a tile's mean and sparkle are the slice's as nearly as its cells
+//! can make them. The lowest eight bits say when the cell's flake changes as the paint turns, spread evenly over cells
+//! that follow one another.
+//!
+//! Places and order come from 32-bit integer hashing and the tile has no seam; a shader reads it from a texture.
 
 use super::flakes::FlakeTexture;
 use super::sparkle::{mix, unit};
@@ -35,11 +41,12 @@ impl RandomTexture {
     pub fn new(width: u32, height: u32, spacing: f64, seed: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         // Not a number is no spacing either.
-        let cells = if spacing.is_nan() || spacing < LEAST_SPACING {
-            (0..width.wrapping_mul(height)).map(|texel| mix(texel ^ mix(seed))).collect()
+        let mut cells = if spacing.is_nan() || spacing < LEAST_SPACING {
+            (0..width.wrapping_mul(height)).collect()
         } else {
-            nearest_numbers(width, height, spacing, seed)
+            nearest_points(width, height, spacing, seed)
         };
+        deal_numbers(&mut cells, seed);
         Self { width, height, cells }
     }
 
@@ -78,7 +85,7 @@ impl RandomTexture {
 /// Points in each bucket.
 const PER_BUCKET: u32 = 4;
 
-/// A scattered point: its place in texels and its number.
+/// A scattered point: its place in texels and its index.
 type Point = (f64, f64, u32);
 
 /// The buckets of a tile, a whole number of them across and down.
@@ -106,22 +113,23 @@ impl Buckets {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below 2^30: at most 16 per texel
             let bucket = (row.rem_euclid(i64::from(self.rows)) * columns + column.rem_euclid(columns)) as u32;
             for k in 0..PER_BUCKET {
-                let number = mix(bucket.wrapping_mul(PER_BUCKET).wrapping_add(k) ^ mix(self.seed));
+                let index = bucket.wrapping_mul(PER_BUCKET).wrapping_add(k);
+                let hash = mix(index ^ mix(self.seed));
                 #[allow(clippy::cast_precision_loss)] // small integers
-                let place = |at: i64, salt: u32| at as f64 + f64::from(unit(mix(number ^ salt)));
+                let place = |at: i64, salt: u32| at as f64 + f64::from(unit(mix(hash ^ salt)));
                 let (x, y) = (place(column, 0x68bc_21eb), place(row, 0x02e5_be93));
-                points.push((x * self.step[0], y * self.step[1], number));
+                points.push((x * self.step[0], y * self.step[1], index));
             }
         }
         points
     }
 }
 
-/// The number of the nearest point for every texel of a tile.
-fn nearest_numbers(width: u32, height: u32, spacing: f64, seed: u32) -> Vec<u32> {
+/// The index of the nearest point for every texel of a tile.
+fn nearest_points(width: u32, height: u32, spacing: f64, seed: u32) -> Vec<u32> {
     let buckets = Buckets::new(width, height, spacing, seed);
     let mut rows: [(i64, Vec<Point>); 3] = std::array::from_fn(|_| (i64::MIN, Vec::new()));
-    let mut numbers = Vec::with_capacity(width as usize * height as usize);
+    let mut indices = Vec::with_capacity(width as usize * height as usize);
     for y in 0..height {
         let py = f64::from(y) + 0.5;
         #[allow(clippy::cast_possible_truncation)] // a bucket's index
@@ -137,19 +145,46 @@ fn nearest_numbers(width: u32, height: u32, spacing: f64, seed: u32) -> Vec<u32>
             let px = f64::from(x) + 0.5;
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a bucket's index, not negative
             let first = (px / buckets.step[0]).floor().min(f64::from(buckets.columns - 1)) as usize * PER_BUCKET as usize;
-            let (mut distance, mut number) = (f64::INFINITY, 0);
+            let (mut distance, mut index) = (f64::INFINITY, 0);
             for (_, points) in &rows {
                 for &(qx, qy, candidate) in &points[first..first + 3 * PER_BUCKET as usize] {
                     let d = (qx - px) * (qx - px) + (qy - py) * (qy - py);
                     if d < distance {
-                        (distance, number) = (d, candidate);
+                        (distance, index) = (d, candidate);
                     }
                 }
             }
-            numbers.push(number);
+            indices.push(index);
         }
     }
-    numbers
+    indices
+}
+
+/// Replaces the index of every texel's cell by the cell's number.
+fn deal_numbers(cells: &mut [u32], seed: u32) {
+    let points = cells.iter().max().map_or(0, |last| *last as usize + 1);
+    let mut area = vec![0_u32; points];
+    for &index in &*cells {
+        area[index as usize] += 1;
+    }
+    let order = mix(seed ^ 0xa511_e9b3);
+    #[allow(clippy::cast_possible_truncation)] // indices are 32 bit
+    let mut dealt: Vec<(u32, u32)> =
+        (0..points as u32).filter(|k| area[*k as usize] > 0).map(|k| (mix(k ^ order), k)).collect();
+    dealt.sort_unstable();
+    let (whole, mut before) = (cells.len() as u64, 0_u64);
+    for (place, (_, index)) in (0_u32..).zip(dealt) {
+        let own = u64::from(area[index as usize]);
+        // The middle of before..before + own, of whole; an area of one texel is at least 2^32 / 2^26 long.
+        #[allow(clippy::cast_possible_truncation)] // below 2^32, since the middle is below whole
+        let number = (((2 * before + own) << 31) / whole) as u32;
+        // Golden sections spread any run of places evenly.
+        area[index as usize] = number & !0xff | place.wrapping_mul(0x9e37_79b9) >> 24;
+        before += own;
+    }
+    for cell in cells {
+        *cell = area[*cell as usize];
+    }
 }
 
 /// Spacing of cells, in texels, whose autocorrelation falls to one half at `grain` texels.
@@ -231,6 +266,20 @@ mod tests {
             let found = grain_of(&tiles);
             // 3 · 240² / spacing² cells, at least 380, whose sizes scatter by half: a standard error under 3 %.
             assert!((found / grain - 1.0).abs() < 0.06, "{found} instead of {grain}");
+        }
+    }
+
+    #[test]
+    fn every_interval_of_numbers_covers_its_share_of_the_tile() {
+        for spacing in [0.5, 2.0, 5.0] {
+            let tile = RandomTexture::new(200, 100, spacing, 9);
+            let mut numbers = tile.cells().to_vec();
+            numbers.sort_unstable();
+            for (rank, number) in numbers.iter().enumerate() {
+                let (share, place) = (rank as f64 / 20_000.0, f64::from(*number) / 4_294_967_296.0);
+                // Off by the rest of the cell itself; the largest is several times the mean of spacing² texels.
+                assert!((share - place).abs() <= 8.0 * spacing * spacing / 20_000.0, "{spacing}: {share} {place}");
+            }
         }
     }
 

@@ -1,9 +1,13 @@
 //! Which flake a texel of the paint shows.
 //!
-//! A texel carries the number of its cell ([`RandomTexture`](super::RandomTexture)). It is hashed with two *epochs*,
-//! `floor(θ/persistence + phase)` with a phase per cell: the probability that a cell still shows the same flake after
-//! `Δθ` is `1 − Δθ/persistence`, which gives the lifetime. From the hash come the number that picks a cluster by
-//! cumulative probability, and three that place the color in its box.
+//! A texel carries the number of its cell ([`RandomTexture`](super::RandomTexture)), and with each angle there are two
+//! *epochs*, `floor(θ/persistence + phase)` with a phase per cell: the probability that a cell still shows the same flake
+//! after `Δθ` is `1 − Δθ/persistence`, which gives the lifetime. Cell and epochs give the number that picks a cluster by
+//! cumulative probability, and three more by hashing that place the color in its box.
+//!
+//! The pick is not a hash but `cell (1 + 2h)(1 + 2d) + (h + d) c` modulo one: cells whose numbers cover `0..1` evenly
+//! then do so in every epoch, and a tile keeps the histogram of its slice at every angle. With `c = (3 − √3)/6` the picks
+//! of two epochs are uncorrelated, as a flake that went dark says nothing of its successor.
 //!
 //! All of it is 32-bit integer arithmetic, so that a shader draws the very same flakes. The mixing step is
 //! PCG-RXS-M-XS (M. O'Neill, 2014). Hash by the texel on the paint, never by the pixel or the frame.
@@ -37,20 +41,27 @@ pub struct TexelDraw {
     pub place: [f32; 3],
 }
 
+/// 2^32 (3 − √3)/6.
+const EPOCH_TURN: u32 = 0x3619_62ea;
+
 impl TexelDraw {
     /// Numbers of a cell while the angles, in degrees, stay within its epochs.
     #[must_use]
     pub fn of(cell: u32, theta_h_deg: f32, theta_d_deg: f32, persistence_deg: [f32; 2]) -> Self {
-        let epoch = |theta: f32, persistence: f32, salt: u32| {
+        let epoch = |theta: f32, persistence: f32, phase: f32| {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most 90 / 0.01
-            let whole = (theta / persistence.max(0.01) + unit(mix(cell ^ salt))).max(0.0) as u32;
+            let whole = (theta / persistence.max(0.01) + phase).max(0.0) as u32;
             whole
         };
-        let h = epoch(theta_h_deg, persistence_deg[0], 0x9e37_79b9);
-        let d = epoch(theta_d_deg, persistence_deg[1], 0x85eb_ca6b);
+        #[allow(clippy::cast_precision_loss)] // eight bits
+        let phase_h = ((cell & 0xff) as f32 + 0.5) / 256.0;
+        let h = epoch(theta_h_deg, persistence_deg[0], phase_h);
+        let d = epoch(theta_d_deg, persistence_deg[1], unit(mix(cell ^ 0x85eb_ca6b)));
         let key = mix(cell ^ mix(h ^ mix(d ^ 0xc2b2_ae35)));
+        let spread = h.wrapping_mul(2).wrapping_add(1).wrapping_mul(d.wrapping_mul(2).wrapping_add(1));
+        let turned = cell.wrapping_mul(spread).wrapping_add(h.wrapping_add(d).wrapping_mul(EPOCH_TURN));
         Self {
-            pick: unit(mix(key)),
+            pick: unit(turned),
             place: [unit(mix(key ^ 0x2545_f491)), unit(mix(key ^ 0x51ed_270b)), unit(mix(key ^ 0x7feb_352d))],
         }
     }

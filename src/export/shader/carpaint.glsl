@@ -187,17 +187,18 @@ uint carpaint_cell(ivec2 texel) {
     return carpaint_mix(cell ^ carpaint_mix(uint(tile.x) + carpaint_mix(uint(tile.y))));
 }
 
-uint carpaint_epoch(uint cell, float theta_deg, float persistence_deg, uint salt) {
-    return uint(max(theta_deg / max(persistence_deg, 0.01) + carpaint_unit(carpaint_mix(cell ^ salt)), 0.0));
+uint carpaint_epoch(float theta_deg, float persistence_deg, float phase) {
+    return uint(max(theta_deg / max(persistence_deg, 0.01) + phase, 0.0));
 }
 
 // The four random numbers of a cell at an angle pair: x picks the cluster, yzw place the color in its box.
 vec4 carpaint_draw(uint cell, float theta_h_deg, float theta_d_deg) {
-    uint h = carpaint_epoch(cell, theta_h_deg, carpaint_persistence_deg.x, 0x9e3779b9u);
-    uint d = carpaint_epoch(cell, theta_d_deg, carpaint_persistence_deg.y, 0x85ebca6bu);
+    uint h = carpaint_epoch(theta_h_deg, carpaint_persistence_deg.x, (float(cell & 255u) + 0.5) / 256.0);
+    uint d = carpaint_epoch(theta_d_deg, carpaint_persistence_deg.y, carpaint_unit(carpaint_mix(cell ^ 0x85ebca6bu)));
     uint key = carpaint_mix(cell ^ carpaint_mix(h ^ carpaint_mix(d ^ 0xc2b2ae35u)));
     return vec4(
-        carpaint_unit(carpaint_mix(key)),
+        // Numbers that cover 0..1 evenly do so in every epoch.
+        carpaint_unit(cell * (1u + 2u * h) * (1u + 2u * d) + (h + d) * 0x361962eau),
         carpaint_unit(carpaint_mix(key ^ 0x2545f491u)),
         carpaint_unit(carpaint_mix(key ^ 0x51ed270bu)),
         carpaint_unit(carpaint_mix(key ^ 0x7feb352du))
