@@ -129,6 +129,7 @@ impl<'a> Kernel<'a> {
         view: &View,
         light: Lanes3,
         cells: &Cells,
+        contrast: Lanes,
     ) -> Answer {
         let outer = [light[0], light[1], light[2].at_least(LEAST_COSINE)];
         let (mut inner, mut transmission) = (outer, Lanes::splat(1.0));
@@ -166,9 +167,9 @@ impl<'a> Kernel<'a> {
         color = std::array::from_fn(|k| color[k] * sum[k]);
         if FLAKES && let Some(flakes) = &self.flakes {
             for (k, cell) in cells.iter().enumerate() {
-                let flake = flakes.color(*cell, theta_h.0[k], theta_d.0[k]);
-                for (lanes, value) in color.iter_mut().zip(flake) {
-                    lanes.0[k] += value;
+                let (flake, mean) = flakes.color_and_mean(*cell, theta_h.0[k], theta_d.0[k]);
+                for c in 0..3 {
+                    color[c].0[k] += mean[c] + (flake[c] - mean[c]) * contrast.0[k];
                 }
             }
         }
