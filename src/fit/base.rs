@@ -187,7 +187,8 @@ fn paint_of(shape: &Shape, color_table: ColorTable) -> CarPaint {
 
 fn finish(best: Candidate, judge: &Judge) -> Result<FittedBase, FitError> {
     let mut shape = best.shape;
-    for (field, value) in [("diffuse", shape.diffuse)].into_iter().chain(shape.lobes.map(|l| ("a lobe's weight", l.0))) {
+    for (field, value) in [("diffuse", shape.diffuse)].into_iter().chain(shape.lobes.map(|l| ("a lobe's weight", l.0)))
+    {
         if !(0.0..=MAX_WEIGHT).contains(&value) {
             return Err(FitError::NotAReflectance { field, value });
         }
@@ -248,7 +249,10 @@ mod tests {
 
     /// A number in 0..1 that depends on both directions and nothing else.
     fn noise(wi: Direction, wo: Direction) -> f64 {
-        let bits = wi.iter().chain(&wo).fold(0_u64, |h, v| (h ^ v.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29));
+        let bits = wi
+            .iter()
+            .chain(&wo)
+            .fold(0_u64, |h, v| (h ^ v.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29));
         f64::from(u32::try_from(bits >> 40).expect("24 bits")) / f64::from(1_u32 << 24)
     }
 
@@ -260,8 +264,11 @@ mod tests {
 
     fn peak_and_flop(base: &FittedBase) -> [f64; 2] {
         let paint = CarPaint {
-            coat: base.coat, diffuse: base.diffuse, lobes: base.lobes.clone(),
-            color_table: base.color_table.clone(), flakes: None,
+            coat: base.coat,
+            diffuse: base.diffuse,
+            lobes: base.lobes.clone(),
+            color_table: base.color_table.clone(),
+            flakes: None,
         };
         let r = Reflectance::new(&paint);
         let at = |deg: f64| {
@@ -312,7 +319,10 @@ mod tests {
 
     #[test]
     fn nothing_to_fit_is_refused_by_name() {
-        assert!(matches!(fit_base(&From(|_, _| None), CoatChoice::ByResidual), Err(FitError::TooFewSamples { found: 0, .. })));
+        assert!(matches!(
+            fit_base(&From(|_, _| None), CoatChoice::ByResidual),
+            Err(FitError::TooFewSamples { found: 0, .. })
+        ));
         assert_eq!(fit_base(&From(|_, _| Some([0.0; 3])), CoatChoice::ByResidual), Err(FitError::Dark));
         assert_eq!(fit_base(&From(|_, _| Some([0.1; 3])), CoatChoice::Ior(0.5)), Err(FitError::Ior(0.5)));
         let few = From(|i: Direction, o| (noise(i, o) < 1e-3).then_some([0.1; 3]));
@@ -341,7 +351,8 @@ mod tests {
             flakes: None,
         };
         let reflectance = Reflectance::new(&truth);
-        let measured = From(|i, o| Some(reflectance.evaluate(i, o, Chi::Table).map(|v| v * (0.95 + 0.1 * noise(i, o)))));
+        let measured =
+            From(|i, o| Some(reflectance.evaluate(i, o, Chi::Table).map(|v| v * (0.95 + 0.1 * noise(i, o)))));
         let base = fit_base(&measured, CoatChoice::ByResidual).expect("a fit");
         let coat = base.coat.expect("a coat");
         assert!((coat.ior - 1.5).abs() < 0.05 && (coat.roughness / 0.03 - 1.0).abs() < 0.05, "{coat:?}");
@@ -355,7 +366,9 @@ mod tests {
     fn the_number_of_threads_changes_no_bit() {
         let fit = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| fit_base(&From(|i, o| Some(satin(i, o).map(|v| v * (0.8 + 0.4 * noise(i, o))))), CoatChoice::ByResidual))
+            pool.install(|| {
+                fit_base(&From(|i, o| Some(satin(i, o).map(|v| v * (0.8 + 0.4 * noise(i, o))))), CoatChoice::ByResidual)
+            })
         };
         assert_eq!(fit(1).expect("a fit"), fit(3).expect("a fit"));
     }

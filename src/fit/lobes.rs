@@ -81,9 +81,7 @@ struct Geometry {
 fn geometry(wi: Direction, wo: Direction, ior: Option<f64>) -> Geometry {
     let outer = half_angles(wi, wo);
     let spread = |h_z: f64| -4.0 * h_z.ln();
-    let masking = |h: &crate::paint::HalfAngles, i: f64, o: f64| {
-        (1.0 / (i * o)).min(2.0 * h.h_z / (h.h_o * i.max(o)))
-    };
+    let masking = |h: &crate::paint::HalfAngles, i: f64, o: f64| (1.0 / (i * o)).min(2.0 * h.h_z / (h.h_o * i.max(o)));
     let Some(ior) = ior else {
         return Geometry {
             tan2: outer.tan2_h,
