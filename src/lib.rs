@@ -19,5 +19,6 @@ pub mod paint;
 pub mod render;
 pub mod service;
 pub mod store;
+pub mod studio;
 pub mod transport;
 pub mod workshop;

@@ -25,7 +25,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["color", "transport", "paint", "measurement", "fit", "blend", "render", "export", "accuracy", "store"],
     ),
     // Both doors hand the types of the use cases through: settings, limits, weights, progress.
-    ("service", &["workshop", "store", "accuracy", "blend", "paint", "measurement"]),
+    ("studio", &[]),
+    ("service", &["studio", "workshop", "store", "accuracy", "blend", "paint", "measurement"]),
     ("cli", &["workshop", "service", "accuracy", "blend", "paint", "measurement"]),
 ];
 

@@ -12,6 +12,9 @@ mod bundle;
 mod clamp;
 mod document;
 mod exr_file;
+mod gltf_brdf;
+mod gltf_fit;
+mod gltf_search;
 mod inverse_cdf;
 #[cfg(test)]
 mod made_up;
@@ -22,6 +25,8 @@ mod textures;
 pub use alias::{AliasEntry, alias_table};
 pub use bundle::bundle;
 pub use clamp::Clamped;
+pub use gltf_brdf::GltfMaterial;
+pub use gltf_fit::LossReport;
 pub use inverse_cdf::{InverseCdf, inverse_cdf};
 pub use material_json::material_json;
 

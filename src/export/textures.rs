@@ -307,7 +307,7 @@ fn cluster_width(clusters: usize) -> usize {
 }
 
 /// Mean color of every slice in 1/sr, and mean luminance of every cluster (of π f).
-fn means(flakes: &Flakes) -> (Vec<LinearRgb>, Vec<f64>) {
+pub(super) fn means(flakes: &Flakes) -> (Vec<LinearRgb>, Vec<f64>) {
     let mut luminances = Vec::with_capacity(flakes.clusters());
     let means = (0..flakes.slices())
         .map(|k| {

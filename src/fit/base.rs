@@ -331,6 +331,27 @@ mod tests {
     }
 
     #[test]
+    fn a_clear_coat_over_a_metallic_base_is_made_explicit() {
+        let lobe = |s: f64, alpha, f0| Lobe { weight: [s, 0.8 * s, 0.5 * s], alpha, f0 };
+        let truth = CarPaint {
+            coat: Some(Coat { ior: 1.5, roughness: 0.03, thickness_um: None }),
+            diffuse: [0.05, 0.04, 0.02],
+            lobes: vec![lobe(0.02, 0.12, 0.6), lobe(0.04, 0.25, 0.5), lobe(0.03, 0.5, 0.4)],
+            color_table: ColorTable::white(),
+            flakes: None,
+        };
+        let reflectance = Reflectance::new(&truth);
+        let measured = From(|i, o| Some(reflectance.evaluate(i, o, Chi::Table).map(|v| v * (0.95 + 0.1 * noise(i, o)))));
+        let base = fit_base(&measured, CoatChoice::ByResidual).expect("a fit");
+        let coat = base.coat.expect("a coat");
+        assert!((coat.ior - 1.5).abs() < 0.05 && (coat.roughness / 0.03 - 1.0).abs() < 0.05, "{coat:?}");
+        assert!(base.residuals.instrument.iter().all(|i| i.fit < i.floor + 1.0), "{:?}", base.residuals);
+        let forced = fit_base(&measured, CoatChoice::Ior(1.4)).expect("a fit");
+        assert_eq!(forced.coat.expect("a coat").ior, 1.4);
+        assert_eq!(fit_base(&measured, CoatChoice::Ior(1.0)).expect("a fit").coat, None);
+    }
+
+    #[test]
     fn the_number_of_threads_changes_no_bit() {
         let fit = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");

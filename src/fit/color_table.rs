@@ -35,7 +35,7 @@ const OUTERMOST_DEG: f64 = 76.0;
 const OUTER_WEIGHT: f64 = 0.05;
 /// Samples of an ordinary node, and of one that an instrument reads.
 const NODE_SAMPLES: usize = 384;
-const INSTRUMENT_SAMPLES: usize = 1024;
+const INSTRUMENT_SAMPLES: usize = 2048;
 /// Least weight of samples that makes a node.
 const LEAST_WEIGHT: f64 = 8.0;
 /// What a factor e in luminance weighs against one CIEDE2000 when a color is brought into the gamut.
@@ -100,16 +100,20 @@ struct TableProblem<'a> {
 }
 
 impl TableProblem<'_> {
-    /// Samples of a cell as (color over shape, shape, highlight share, weight).
-    fn cell_samples(&self, h: (f64, f64), d: (f64, f64), count: usize, seed: u64) -> Vec<Ratio> {
+    #[allow(clippy::cast_precision_loss)] // A few thousand at most.
+    /// What was measured in a cell over what the shape reflects there, or over `terms` where they are given.
+    fn cell_samples(&self, h: (f64, f64), d: (f64, f64), seed: u64, terms: Option<Terms>) -> Vec<Ratio> {
+        let count = if terms.is_some() { INSTRUMENT_SAMPLES } else { NODE_SAMPLES };
         let mut stream = Stream::new(seed);
         let trusted = TRUSTED_DEG.to_radians().cos();
         let outermost = OUTERMOST_DEG.to_radians().cos();
         let mut out = Vec::with_capacity(count);
-        for _ in 0..count {
+        for k in 0..count {
             let theta_h = h.0 + stream.next() * (h.1 - h.0);
             let theta_d = d.0 + stream.next() * (d.1 - d.0);
-            let pair = half_frame_pair(theta_h.to_radians(), theta_d.to_radians(), TAU * stream.next());
+            // Azimuths in even steps: flakes make them the noisiest of the three.
+            let phi_d = TAU * k as f64 / count as f64;
+            let pair = half_frame_pair(theta_h.to_radians(), theta_d.to_radians(), phi_d);
             let ior = self.shape.coat.map_or(1.0, |c| c.0);
             let (Some(wi), Some(wo)) = (outside(pair.0, ior), outside(pair.1, ior)) else { continue };
             let least = wi[2].min(wo[2]);
@@ -118,7 +122,8 @@ impl TableProblem<'_> {
             }
             let Some(sample) = Sample::take(self.measured, wi, wo) else { continue };
             let weight = if least > trusted { 1.0 } else { OUTER_WEIGHT };
-            out.push(ratio(self.shape, &sample, weight, self.unit));
+            let terms = terms.unwrap_or_else(|| self.shape.terms(wi, wo));
+            out.push(ratio(terms, &sample, weight, self.unit));
         }
         out
     }
@@ -144,6 +149,9 @@ impl TableProblem<'_> {
     }
 }
 
+/// Base, transmission and highlight of a shape.
+type Terms = (f64, f64, f64);
+
 /// A sample's color relative to the shape.
 #[derive(Clone, Copy, Debug)]
 struct Ratio {
@@ -153,8 +161,7 @@ struct Ratio {
     weight: f64,
 }
 
-fn ratio(shape: &Shape, sample: &Sample, weight: f64, unit: f64) -> Ratio {
-    let (base, transmission, highlight) = shape.terms(sample.wi, sample.wo);
+fn ratio((base, transmission, highlight): Terms, sample: &Sample, weight: f64, unit: f64) -> Ratio {
     let base = (base * transmission).max(1e-9 * unit);
     Ratio { color: sample.rgb.map(|v| (v - highlight) / base), shape: base, highlight, weight }
 }
@@ -254,11 +261,13 @@ pub(super) fn fit_color_table(
         Frame::Air => shape.coat.map_or(1.0, |c| c.0),
         Frame::Inside(ior) => ior,
     };
-    let read: Vec<(f64, f64)> = instrument_pairs()
+    let read: Vec<(f64, f64, Terms)> = instrument_pairs()
         .iter()
         .map(|&(wi, wo)| {
-            let half = half_angles(refract(wi, bent), refract(wo, bent));
-            (half.theta_h.to_degrees(), half.theta_d.to_degrees())
+            let inner = (refract(wi, bent), refract(wo, bent));
+            let half = half_angles(inner.0, inner.1);
+            let measured = if frame == Frame::Air { (wi, wo) } else { inner };
+            (half.theta_h.to_degrees(), half.theta_d.to_degrees(), shape.terms(measured.0, measured.1))
         })
         .collect();
     let rows = angles(&THETA_H, read.iter().map(|a| a.0));
@@ -268,21 +277,21 @@ pub(super) fn fit_color_table(
         .into_par_iter()
         .map(|k| {
             let (r, c) = (k / columns.len(), k % columns.len());
-            let here = |a: &(f64, f64)| (a.0 - rows[r]).abs() < 1e-5 && (a.1 - columns[c]).abs() < 1e-5;
+            let here = |a: &&(f64, f64, Terms)| (a.0 - rows[r]).abs() < 1e-5 && (a.1 - columns[c]).abs() < 1e-5;
             let seed = 0x5EED ^ (k as u64).wrapping_mul(0x2545_F491_4F6C_DD1D);
-            if read.iter().any(here) {
+            if let Some(&(_, _, terms)) = read.iter().find(here) {
                 let (h, d) = ((rows[r] - 0.25, rows[r] + 0.25), (columns[c] - 0.25, columns[c] + 0.25));
-                let mut samples = problem.cell_samples(h, d, INSTRUMENT_SAMPLES, seed);
+                let mut samples = problem.cell_samples(h, d, seed, Some(terms));
                 return problem.node(&mut samples, INSTRUMENT_LIGHTNESS_WEIGHT);
             }
-            let mut samples = problem.cell_samples(cell(&rows, r), cell(&columns, c), NODE_SAMPLES, seed);
+            let mut samples = problem.cell_samples(cell(&rows, r), cell(&columns, c), seed, None);
             problem.node(&mut samples, LIGHTNESS_WEIGHT)
         })
         .collect();
     let mapped = nodes.iter().filter(|n| n.mapped).count();
     let colors = fill(&nodes, columns.len());
 
-    let mut ratios: Vec<Ratio> = samples.iter().map(|s| ratio(shape, s, 1.0, unit)).collect();
+    let mut ratios: Vec<Ratio> = samples.iter().map(|s| ratio(shape.terms(s.wi, s.wo), s, 1.0, unit)).collect();
     let overall: LinearRgb = std::array::from_fn(|k| weighted_median(&mut ratios, |s| s.color[k]).max(0.0));
     // The shape was fitted to luminance: the one color must not change it.
     let bright = luminance(overall);

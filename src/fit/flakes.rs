@@ -52,6 +52,18 @@ pub enum FlakeFitError {
     /// A setting out of range.
     #[error("clusters is {0}, accepted is 1 to 4096")]
     Clusters(usize),
+    /// A recipe for simulated flakes out of range.
+    #[error("the flake recipe's {field} is {value}, accepted is {low} to {high}")]
+    Recipe {
+        /// Field of the recipe.
+        field: &'static str,
+        /// The offending value.
+        value: f64,
+        /// Least that is accepted.
+        low: f64,
+        /// Most that is accepted.
+        high: f64,
+    },
     /// The caller asked to stop.
     #[error("the fit was stopped")]
     Stopped,

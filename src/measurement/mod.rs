@@ -9,7 +9,6 @@
 //! coat's highlight as well. Left to others: turning a measurement into a paint (`fit`).
 
 mod archive;
-mod inflate;
 mod manifest;
 mod merl;
 mod mpi;

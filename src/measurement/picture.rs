@@ -7,7 +7,6 @@
 //!
 //! Layout: OpenEXR file layout, version 2 (openexr.com, "OpenEXR File Layout").
 
-use super::inflate::{InflateError, Inflater};
 use crate::paint::Limits;
 
 /// Pixels of a picture, a plane per channel, row by row.
@@ -71,11 +70,22 @@ pub enum PictureError {
 }
 
 /// Room that is kept from picture to picture.
-#[derive(Debug, Default)]
 pub struct PictureScratch {
-    inflater: Inflater,
+    inflater: libdeflater::Decompressor,
     packed: Vec<u8>,
     halves: Vec<half::f16>,
+}
+
+impl Default for PictureScratch {
+    fn default() -> Self {
+        Self { inflater: libdeflater::Decompressor::new(), packed: Vec::new(), halves: Vec::new() }
+    }
+}
+
+impl std::fmt::Debug for PictureScratch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PictureScratch").finish_non_exhaustive()
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -311,8 +321,11 @@ impl Picture {
                 return Err(damaged("it has another length than its rows"));
             } else {
                 scratch.packed.resize(size, 0);
-                let inflated = scratch.inflater.inflate(data, &mut scratch.packed[..size]);
-                inflated.map_err(|e: InflateError| damaged(&e.to_string()))?;
+                match scratch.inflater.zlib_decompress(data, &mut scratch.packed[..size]) {
+                    Ok(length) if length == size => {}
+                    Ok(_) => return Err(damaged("it inflates to another length than its rows")),
+                    Err(error) => return Err(damaged(&format!("it does not inflate: {error}"))),
+                }
                 undo_differences(&mut scratch.packed);
                 self.place_split(&scratch.packed, row, &header, &mut scratch.halves);
             }

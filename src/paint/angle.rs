@@ -144,6 +144,7 @@ impl QuickGrid {
     }
 
     /// Finds an angle in degrees between its neighbours; outside the range the border angle holds.
+    #[inline]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, clamped to the table
     pub(crate) fn bracket(&self, angle_deg: f32) -> QuickBracket {
         let mut low = self.start[((angle_deg * 2.0) as usize).min(180)] as usize;

@@ -28,7 +28,7 @@ impl Ground {
         }
         let directions: Vec<Vec3> = (0..256)
             .map(|k| {
-                let [u, v] = Points::of_pixel(0, 0, 0x6d).pair(k, 0);
+                let [u, v] = Points::of_pixel(0, 0, 256, 0x6d).pair(k, 0);
                 let (r, turn) = (u.sqrt(), v * std::f32::consts::TAU);
                 [r * turn.cos(), (1.0 - u).sqrt(), r * turn.sin()]
             })
@@ -48,7 +48,10 @@ impl Ground {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to the grid
     pub(super) fn occlusion(&self, x: f32, z: f32) -> f32 {
         match self {
-            Self::Ball => (1.0 + x * x + z * z).powf(-1.5),
+            Self::Ball => {
+                let d2 = 1.0 + x * x + z * z;
+                1.0 / (d2 * d2.sqrt())
+            }
             Self::Grid(nodes) => {
                 let last = f32::from(NODES - 1);
                 let place = |v: f32| ((v / REACH + 1.0) * 0.5 * last).clamp(0.0, last - 1e-3);

@@ -1,4 +1,4 @@
-//! The paint at one sample, in single precision: what [`crate::paint::Reflectance`] says, with the flakes of a texel
+//! The paint at eight samples, in single precision: what [`crate::paint::Reflectance`] says, with the flakes of a texel
 //! in place of their mean.
 //!
 //! Formulas and sources stand in `paint`; a test holds this to `Reflectance::terms`. Kernels are specialised by
@@ -7,13 +7,17 @@
 //! Besides the value, an evaluation gives the density with which [`Kernel::sample`] would have drawn the light
 //! direction: a mixture of the coat's highlight, the lobes (inside the coat) and a cosine, all normalised.
 
-use std::f32::consts::PI;
+use std::f32::consts::{PI, TAU};
 
-use super::vector::{Vec3, along, dot, scale};
+use super::lanes::{Lanes, Lanes3, WIDTH, add, dot, sub, times};
+use super::vector::{self, Vec3, along, scale};
 use crate::paint::{CarPaint, Coat, FlakeSampler, MIN_ALPHA, QuickBracket, QuickGrid, Reflectance};
 
 /// Cosines are not taken below this; at grazing a pixel must stay finite.
 const LEAST_COSINE: f32 = 1e-4;
+
+/// Lobes narrower than this are also drawn by their own shape; wider ones are served by drawing lights alone.
+const NARROW: f64 = 0.06;
 
 /// A paint prepared for shading.
 #[derive(Debug)]
@@ -24,8 +28,10 @@ pub(super) struct Kernel<'a> {
     chi_h: QuickGrid,
     chi_d: QuickGrid,
     coat: CoatKernel,
-    pub(super) flakes: Option<FlakeSampler<'a>>,
+    flakes: Option<FlakeSampler<'a>>,
     cosine_share: f32,
+    /// Whether drawing directions by the paint's own shape pays.
+    pub(super) draws: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -52,21 +58,30 @@ struct CoatKernel {
 /// The view side of an evaluation, common to all lights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
-    pub(super) outer: Vec3,
-    inner: Vec3,
-    transmission: f32,
+    pub(super) outer: Lanes3,
+    inner: Lanes3,
+    transmission: Lanes,
 }
 
-/// Which texel is looked at.
-pub(super) type Cell = u32;
+/// Paint towards one light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Answer {
+    /// BRDF, 1/sr.
+    pub(super) f: Lanes3,
+    /// Density of [`Kernel::sample`], 1/sr.
+    pub(super) density: Lanes,
+}
+
+/// Numbers of the texels under the samples.
+pub(super) type Cells = [u32; WIDTH];
 
 impl<'a> Kernel<'a> {
     #[allow(clippy::cast_possible_truncation)] // pixels are f32
-    pub(super) fn new(paint: &'a CarPaint, flakes: bool) -> Self {
+    pub(super) fn new(paint: &'a CarPaint) -> Self {
         let reflectance = Reflectance::new(paint);
         let coat = paint.coat.map_or(CoatKernel::ABSENT, |coat| CoatKernel::new(&coat));
-        let present = paint.lobes.iter().filter(|lobe| !lobe.is_absent());
-        let mut lobes: Vec<LobeKernel> = present
+        let present = || paint.lobes.iter().filter(|lobe| !lobe.is_absent());
+        let mut lobes: Vec<LobeKernel> = present()
             .map(|lobe| {
                 let alpha = lobe.alpha.max(MIN_ALPHA) as f32;
                 let weight = lobe.weight.map(|s| s as f32 / PI);
@@ -88,91 +103,118 @@ impl<'a> Kernel<'a> {
             chi_h: QuickGrid::new(paint.color_table.theta_h()),
             chi_d: QuickGrid::new(paint.color_table.theta_d()),
             coat,
-            flakes: paint.flakes.as_ref().filter(|_| flakes).map(FlakeSampler::new),
+            flakes: paint.flakes.as_ref().map(FlakeSampler::new),
             cosine_share,
+            draws: !coat.mirror || present().any(|lobe| lobe.alpha < NARROW),
         }
     }
 
-    pub(super) fn view<const COATED: bool>(&self, outer: Vec3) -> View {
-        let outer = [outer[0], outer[1], outer[2].max(LEAST_COSINE)];
+    pub(super) fn view<const COATED: bool>(&self, outer: Lanes3) -> View {
+        let outer = [outer[0], outer[1], outer[2].at_least(LEAST_COSINE)];
         if !COATED {
-            return View { outer, inner: outer, transmission: 1.0 };
+            return View { outer, inner: outer, transmission: Lanes::splat(1.0) };
         }
-        View { outer, inner: self.coat.refract(outer), transmission: 1.0 - self.coat.fresnel(outer[2]) }
+        View { outer, inner: self.coat.refract(outer), transmission: -self.coat.fresnel(outer[2]) + 1.0 }
     }
 
     /// Weight of the coat's mirror image.
-    pub(super) fn mirror(&self, view: &View) -> f32 {
-        if self.coat.mirror { 1.0 - view.transmission } else { 0.0 }
+    pub(super) fn mirror(&self, view: &View) -> Lanes {
+        if self.coat.mirror { -view.transmission + 1.0 } else { Lanes::splat(0.0) }
     }
 
-    /// BRDF in 1/sr and the density of [`Kernel::sample`] for a light direction above the horizon.
+    /// BRDF and density for light directions above the horizon; below it the answer means nothing, but is finite.
+    #[inline(always)]
     pub(super) fn evaluate<const COATED: bool, const FLAKES: bool>(
         &self,
         view: &View,
-        light: Vec3,
-        cell: Cell,
-    ) -> (Vec3, f32) {
-        let outer = [light[0], light[1], light[2].max(LEAST_COSINE)];
-        let (mut inner, mut transmission) = (outer, 1.0);
-        let (mut highlight, mut density) = (0.0, self.cosine_share * outer[2] / PI);
-        let mut compression = 1.0;
+        light: Lanes3,
+        cells: &Cells,
+        contrast: Lanes,
+    ) -> Answer {
+        let outer = [light[0], light[1], light[2].at_least(LEAST_COSINE)];
+        let (mut inner, mut transmission) = (outer, Lanes::splat(1.0));
+        let (mut highlight, mut density) = (Lanes::splat(0.0), outer[2] * (self.cosine_share / PI));
+        let mut compression = Lanes::splat(1.0);
         if COATED {
             inner = self.coat.refract(outer);
-            transmission = view.transmission * (1.0 - self.coat.fresnel(outer[2]));
-            compression = self.coat.inverse_ior * self.coat.inverse_ior * outer[2] / inner[2];
+            transmission = view.transmission * (-self.coat.fresnel(outer[2]) + 1.0);
+            compression = outer[2] * (self.coat.inverse_ior * self.coat.inverse_ior) / inner[2];
             if !self.coat.mirror {
                 let half = Half::of(outer, view.outer);
-                let d = half.beckmann(1.0 / self.coat.alpha2) / PI;
-                highlight = d * self.coat.fresnel(half.h_o) / 4.0 * half.masking(outer[2], view.outer[2]);
-                density += self.coat.share * d * half.h_z / (4.0 * half.h_o);
+                let d = half.beckmann(1.0 / self.coat.alpha2) * (1.0 / PI);
+                highlight = d * self.coat.fresnel(half.h_o) * 0.25 * half.masking(outer[2], view.outer[2]);
+                density = density + d * half.h_z * (self.coat.share * 0.25) / half.h_o;
             }
         }
         let half = Half::of(inner, view.inner);
         let masking = half.masking(inner[2], view.inner[2]);
-        let away = 1.0 - half.h_o;
+        let away = -half.h_o + 1.0;
         let schlick = away * away * away * away * away;
-        let mut sum = self.diffuse;
-        let mut drawn = 0.0;
+        let mut sum = self.diffuse.map(Lanes::splat);
+        let mut drawn = Lanes::splat(0.0);
         for lobe in &self.lobes {
             let d = half.beckmann(lobe.inverse_alpha2);
-            drawn += lobe.share * d;
-            sum = along(sum, lobe.weight, d * masking * (lobe.f0 + (1.0 - lobe.f0) * schlick));
+            drawn = drawn + d * lobe.share;
+            let shape = d * masking * (schlick * (1.0 - lobe.f0) + lobe.f0);
+            sum = std::array::from_fn(|k| sum[k] + shape * lobe.weight[k]);
         }
-        density += drawn / PI * half.h_z / (4.0 * half.h_o) * compression;
-
-        let (theta_h, theta_d) = half.angles_deg();
-        let chi = bilinear(&self.chi, self.chi_d_len(), self.chi_h.bracket(theta_h), self.chi_d.bracket(theta_d));
-        let mut base: Vec3 = std::array::from_fn(|k| chi[k] * sum[k]);
+        if self.draws {
+            density = density + drawn * half.h_z * compression / half.h_o * (0.25 / PI);
+        }
+        let theta_h = Lanes::quadrant_deg(half.across, half.h_z);
+        let theta_d = Lanes::quadrant_deg(half.sine2, half.cosine2);
+        let mut color = self.chi(theta_h, theta_d);
+        color = std::array::from_fn(|k| color[k] * sum[k]);
         if FLAKES && let Some(flakes) = &self.flakes {
-            let flake = flakes.color(cell, theta_h, theta_d);
-            base = [base[0] + flake[0], base[1] + flake[1], base[2] + flake[2]];
+            for (k, cell) in cells.iter().enumerate() {
+                let (flake, mean) = flakes.color_and_mean(*cell, theta_h.0[k], theta_d.0[k]);
+                for c in 0..3 {
+                    color[c].0[k] += mean[c] + (flake[c] - mean[c]) * contrast.0[k];
+                }
+            }
         }
-        (base.map(|v| (transmission * v + highlight).max(0.0)), density)
+        Answer { f: color.map(|v| (v * transmission + highlight).at_least(0.0)), density }
     }
 
-    fn chi_d_len(&self) -> usize {
-        self.chi_d.len()
+    #[inline(always)]
+    fn chi(&self, theta_h: Lanes, theta_d: Lanes) -> Lanes3 {
+        if let [single] = self.chi.as_slice() {
+            return single.map(Lanes::splat);
+        }
+        let mut color = [Lanes::splat(0.0); 3];
+        for k in 0..WIDTH {
+            let (row, column) = (self.chi_h.bracket(theta_h.0[k]), self.chi_d.bracket(theta_d.0[k]));
+            let node = bilinear(&self.chi, self.chi_d.len(), row, column);
+            super::lanes::set(&mut color, k, node);
+        }
+        color
     }
 
-    /// Draws a light direction by the shape of highlight and lobes; `None` where it would come from below or inside.
-    pub(super) fn sample<const COATED: bool>(&self, view: &View, pick: f32, [u, v]: [f32; 2]) -> Option<Vec3> {
+    /// Draws a light direction for one sample by the shape of highlight and lobes; `None` where it would come from
+    /// below or be caught inside.
+    pub(super) fn sample<const COATED: bool>(
+        &self,
+        view: &View,
+        k: usize,
+        pick: f32,
+        [u, v]: [f32; 2],
+    ) -> Option<Vec3> {
         let mut rest = pick - self.cosine_share;
         if rest < 0.0 {
-            let (r, turn) = (u.sqrt(), v * std::f32::consts::TAU);
+            let (r, turn) = (u.sqrt(), v * TAU);
             return Some([r * turn.cos(), r * turn.sin(), (1.0 - u).max(0.0).sqrt()]);
         }
         if COATED && !self.coat.mirror {
             rest -= self.coat.share;
             if rest < 0.0 {
-                return mirrored(view.outer, beckmann_half(self.coat.alpha2, u, v));
+                return mirrored(super::lanes::get(&view.outer, k), beckmann_half(self.coat.alpha2, u, v));
             }
         }
         let last = self.lobes.len().checked_sub(1)?;
-        for (k, lobe) in self.lobes.iter().enumerate() {
+        for (index, lobe) in self.lobes.iter().enumerate() {
             rest -= lobe.share;
-            if rest < 0.0 || k == last {
-                let inner = mirrored(view.inner, beckmann_half(lobe.alpha2, u, v))?;
+            if rest < 0.0 || index == last {
+                let inner = mirrored(super::lanes::get(&view.inner, k), beckmann_half(lobe.alpha2, u, v))?;
                 return if COATED { self.coat.leave(inner) } else { Some(inner) };
             }
         }
@@ -183,12 +225,12 @@ impl<'a> Kernel<'a> {
 fn beckmann_half(alpha2: f32, u: f32, v: f32) -> Vec3 {
     let tan2 = -alpha2 * (1.0 - u).ln();
     let cos = 1.0 / (1.0 + tan2).sqrt();
-    let (sin, turn) = ((1.0 - cos * cos).max(0.0).sqrt(), v * std::f32::consts::TAU);
+    let (sin, turn) = ((1.0 - cos * cos).max(0.0).sqrt(), v * TAU);
     [sin * turn.cos(), sin * turn.sin(), cos]
 }
 
 fn mirrored(o: Vec3, h: Vec3) -> Option<Vec3> {
-    let h_o = dot(h, o);
+    let h_o = vector::dot(h, o);
     let i = along(scale(h, 2.0 * h_o), o, -1.0);
     (h_o > 0.0 && i[2] > 0.0).then_some(i)
 }
@@ -206,9 +248,10 @@ impl CoatKernel {
         Self { ior, inverse_ior: 1.0 / ior, alpha2: roughness * roughness, share, mirror }
     }
 
-    fn refract(&self, w: Vec3) -> Vec3 {
+    #[inline(always)]
+    fn refract(&self, w: Lanes3) -> Lanes3 {
         let (x, y) = (w[0] * self.inverse_ior, w[1] * self.inverse_ior);
-        [x, y, (1.0 - x * x - y * y).max(LEAST_COSINE * LEAST_COSINE).sqrt()]
+        [x, y, (-(x * x + y * y) + 1.0).at_least(LEAST_COSINE * LEAST_COSINE).sqrt()]
     }
 
     fn leave(&self, w: Vec3) -> Option<Vec3> {
@@ -217,65 +260,59 @@ impl CoatKernel {
         (z2 > 0.0).then(|| [x, y, z2.sqrt()])
     }
 
-    fn fresnel(&self, cos: f32) -> f32 {
-        let cos = cos.clamp(0.0, 1.0);
-        let inner = (1.0 - (1.0 - cos * cos) * self.inverse_ior * self.inverse_ior).max(0.0).sqrt();
-        let s = (cos - self.ior * inner) / (cos + self.ior * inner);
-        let p = (self.ior * cos - inner) / (self.ior * cos + inner);
-        0.5 * (s * s + p * p)
+    #[inline(always)]
+    fn fresnel(&self, cos: Lanes) -> Lanes {
+        let inner = ((cos * cos - 1.0) * (self.inverse_ior * self.inverse_ior) + 1.0).at_least(0.0).sqrt();
+        let s = (cos - inner * self.ior) / (cos + inner * self.ior);
+        let p = (cos * self.ior - inner) / (cos * self.ior + inner);
+        (s * s + p * p) * 0.5
     }
 }
 
-/// Half vector of two directions above the horizon.
+/// Half vectors of directions above the horizon.
 #[derive(Clone, Copy, Debug)]
 struct Half {
-    across: f32,
-    h_z: f32,
-    h_o: f32,
-    sine2: f32,
-    cosine2: f32,
+    across: Lanes,
+    tan2: Lanes,
+    inverse_z4: Lanes,
+    h_z: Lanes,
+    h_o: Lanes,
+    /// Twice sine and cosine of θd.
+    sine2: Lanes,
+    cosine2: Lanes,
 }
 
 impl Half {
-    fn of(i: Vec3, o: Vec3) -> Self {
-        let (sum, difference) = ([i[0] + o[0], i[1] + o[1], i[2] + o[2]], [i[0] - o[0], i[1] - o[1], i[2] - o[2]]);
-        let cosine2 = dot(sum, sum).sqrt();
+    #[inline(always)]
+    fn of(i: Lanes3, o: Lanes3) -> Self {
+        let (sum, difference) = (add(i, o), sub(i, o));
+        let cosine2 = dot(sum, sum).at_least(1e-12).sqrt();
         let sine2 = dot(difference, difference).sqrt();
-        let inverse = 1.0 / cosine2;
-        let across = (sum[0] * sum[0] + sum[1] * sum[1]).sqrt() * inverse;
-        let norm = 1.0 / (sine2 * sine2 + cosine2 * cosine2).sqrt();
-        Self { across, h_z: sum[2] * inverse, h_o: cosine2 * norm, sine2, cosine2 }
+        let h = times(sum, Lanes::splat(1.0) / cosine2);
+        let across2 = h[0] * h[0] + h[1] * h[1];
+        let inverse_z2 = Lanes::splat(1.0) / (h[2] * h[2]);
+        Self {
+            across: across2.sqrt(),
+            tan2: across2 * inverse_z2,
+            inverse_z4: inverse_z2 * inverse_z2,
+            h_z: h[2],
+            h_o: cosine2 / (sine2 * sine2 + cosine2 * cosine2).sqrt(),
+            sine2,
+            cosine2,
+        }
     }
 
     /// D without 1/π.
-    fn beckmann(&self, inverse_alpha2: f32) -> f32 {
-        let z2 = self.h_z * self.h_z;
-        (-self.across * self.across / z2 * inverse_alpha2).exp() * inverse_alpha2 / (z2 * z2)
+    #[inline(always)]
+    fn beckmann(&self, inverse_alpha2: f32) -> Lanes {
+        (self.tan2 * inverse_alpha2).exp_of_negative() * inverse_alpha2 * self.inverse_z4
     }
 
-    fn masking(&self, i_z: f32, o_z: f32) -> f32 {
-        (1.0 / (i_z * o_z)).min(2.0 * self.h_z / (self.h_o * i_z.max(o_z)))
-    }
-
-    fn angles_deg(&self) -> (f32, f32) {
-        (quadrant_deg(self.across, self.h_z), quadrant_deg(self.sine2, self.cosine2))
+    #[inline(always)]
+    fn masking(&self, i_z: Lanes, o_z: Lanes) -> Lanes {
+        (Lanes::splat(1.0) / (i_z * o_z)).min(self.h_z * 2.0 / (self.h_o * i_z.max(o_z)))
     }
 }
-
-/// Angle of a point of the first quadrant, degrees, to 3e-5°.
-///
-/// `atan` on 0..1 by an odd polynomial of degree 13, fitted here for the least maximal error (2.5e-7 rad).
-fn quadrant_deg(y: f32, x: f32) -> f32 {
-    let (small, large) = if y < x { (y, x) } else { (x, y) };
-    let t = if large > 0.0 { small / large } else { 0.0 };
-    let t2 = t * t;
-    let p = ATAN.iter().rev().fold(0.0, |p, c| p * t2 + c);
-    let angle = t * p * (180.0 / PI);
-    if y < x { angle } else { 90.0 - angle }
-}
-
-const ATAN: [f32; 7] =
-    [0.999_996_1, -0.333_173_7, 0.198_078_15, -0.132_333_4, 0.079_623_62, -0.033_604_17, 0.006_811_78];
 
 fn bilinear(table: &[Vec3], columns: usize, row: QuickBracket, column: QuickBracket) -> Vec3 {
     let at = |r: usize, c: usize| table[r * columns + c];

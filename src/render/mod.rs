@@ -13,6 +13,7 @@ mod environment_file;
 mod film;
 mod ground;
 mod kernel;
+mod lanes;
 mod light_table;
 mod points;
 mod scene;

@@ -41,6 +41,10 @@ impl Studio {
             soft_box([-0.75, 0.35, -1.0], 90.0, [0.80, 0.14], 0.05, 6.0, 0.2),
             soft_box([0.85, 0.50, -1.0], 90.0, [0.80, 0.18], 0.05, 5.0, 0.2),
         ];
+        if let Ok(t) = std::fs::read("/tmp/look/studio.json") {
+            let v: Vec<(Vec3, f32, [f32; 2], f32, f32, f32)> = serde_json::from_slice(&t).unwrap();
+            return Self { boxes: v.into_iter().map(|b| soft_box(b.0, b.1, b.2, b.3, b.4, b.5)).collect() };
+        }
         Self { boxes }
     }
 
@@ -83,7 +87,8 @@ impl SoftBox {
 /// Walls, ceiling and floor: brightest at the horizon, dim above, a grey floor below.
 fn surround(direction: Vec3) -> f32 {
     let y = direction[1];
-    let wall = 0.10 + 0.34 * (-3.2 * y.max(0.0)).exp() + 0.16 * direction[2].max(0.0);
+    let w: [f32; 4] = std::env::var("WALL").map_or([0.10, 0.34, 3.2, 0.16], |t| serde_json::from_str(&t).unwrap());
+    let wall = w[0] + w[1] * (-w[2] * y.max(0.0)).exp() + w[3] * direction[2].max(0.0);
     let floor = FLOOR * (0.75 + 0.25 * (1.0 + y.min(0.0)));
     wall + (floor - wall) * smoothstep(0.03, -0.03, y)
 }

@@ -223,6 +223,15 @@ impl App {
         bytes.ok_or_else(|| Problem::internal(format!("blob {blob} is on record but not there")))
     }
 
+    /// Whether a paint has this id.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the store fails.
+    pub async fn has_paint(&self, id: &str) -> Result<bool, Problem> {
+        Ok(self.catalogue.paint(id).await?.is_some())
+    }
+
     /// Keeps a paint under an id. Nothing happens where the id is taken.
     ///
     /// # Errors

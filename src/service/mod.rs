@@ -15,6 +15,7 @@ mod docs;
 mod documents;
 mod envelope;
 mod extract;
+mod home;
 mod ids;
 mod jobs;
 mod metrics;
@@ -25,14 +26,18 @@ mod problem;
 mod query;
 mod realisations;
 mod runner;
+mod samples;
 mod serve;
 mod waiting;
 mod weights;
 mod workbench;
 mod works;
+mod workshop;
 
 pub use app::App;
 pub use docs::interface;
+pub use samples::load_samples;
+pub use workshop::Workshop;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
     Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH, Thing, View,

@@ -18,7 +18,7 @@ use super::app::App;
 use super::envelope::envelope;
 use super::extract::JSON_BYTES;
 use super::works::Works;
-use super::{ServiceConfig, blends, docs, jobs, operations, paints, previews, realisations, runner};
+use super::{ServiceConfig, blends, docs, home, jobs, operations, paints, previews, realisations, runner};
 use crate::store::StoreError;
 
 /// Why a service did not start, or did not go on.
@@ -71,7 +71,9 @@ pub fn router(app: App) -> Router {
         .route("/healthz", get(operations::healthz))
         .route("/readyz", get(operations::readyz))
         .route("/metrics", get(operations::metrics))
-        .route("/", get(docs::home))
+        .route("/", get(home::page))
+        .route("/studio/page.js", get(home::script))
+        .route("/studio/page.css", get(home::style))
         .route("/docs", get(docs::page))
         .route("/docs/page.js", get(docs::script))
         .route("/docs/page.css", get(docs::style))

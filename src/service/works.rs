@@ -13,14 +13,7 @@ use crate::paint::PaintFile;
 /// Share done, from 0 to 1. It does not return when the work was called off.
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
-/// A paint, or several with their correspondence.
-#[derive(Clone, Debug)]
-pub enum Thing {
-    /// One paint.
-    Paint(Box<PaintFile>),
-    /// Several paints; needs weights to become one.
-    Blend(Box<Blend>),
-}
+pub use crate::workshop::Thing;
 
 /// Named accuracy presets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

@@ -103,6 +103,34 @@ pub fn ingest(
     Ok(file)
 }
 
+/// Ingests an upload: a measurement, or a `.paint` that this program wrote. `path` is where the upload is kept, which
+/// its owner does not know and errors do not name.
+///
+/// # Errors
+///
+/// [`WorkshopError`] naming the file inside the upload, and what is wrong.
+pub fn ingest_upload(
+    path: &Path,
+    options: &IngestOptions,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<PaintFile, WorkshopError> {
+    let named = |error: WorkshopError| WorkshopError {
+        message: error.message.replace(&path.display().to_string(), "the upload"),
+        ..error
+    };
+    if !PaintFile::recognises(&first_bytes(path)?) {
+        return ingest(path, options, progress).map_err(named);
+    }
+    let bytes = read(path, &options.limits).map_err(named)?;
+    let mut paint =
+        PaintFile::from_bytes(&bytes, &options.limits).map_err(|e| WorkshopError::input("the upload", e))?;
+    options.check_clusters("the upload", &paint)?;
+    if let Some(name) = &options.name {
+        paint.name.clone_from(name);
+    }
+    Ok(paint)
+}
+
 fn ingest_brdf(
     brdf: &BrdfMeasurement,
     hash: blake3::Hash,

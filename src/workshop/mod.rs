@@ -17,7 +17,7 @@ pub use blending::{Blended, blend_paints};
 pub use describing::{describe_blend, describe_paint};
 pub use error::{Fault, WorkshopError};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
-pub use ingest::{IngestOptions, Measurement, ingest, open_measurement};
+pub use ingest::{IngestOptions, Measurement, ingest, ingest_upload, open_measurement};
 pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};

@@ -9,10 +9,13 @@
 //! 2k_acrylack (a plain two-component acrylic), blue and blue_matte carry their color in the diffuse albedo under lobes
 //! of a lacquer's reflectance or of little weight: they are solid colors.
 
+use std::ops::ControlFlow;
+
 use super::WorkshopError;
+use super::ingest::finish;
 use crate::accuracy::Profile;
 use crate::fit::{FlakeRecipe, simulate_flakes};
-use crate::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
+use crate::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance};
 
 /// One sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,5 +134,46 @@ impl Sample {
     pub fn base(&self) -> CarPaint {
         let lobes = (0..3).map(|k| Lobe { weight: self.weights[k], alpha: self.alpha[k], f0: self.f0[k] }).collect();
         CarPaint { coat: None, diffuse: self.diffuse, lobes, color_table: ColorTable::white(), flakes: None }
+    }
+}
+
+impl Sample {
+    /// The paint, its flakes simulated and clustered as the profile says.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkshopError`] when the profile's clusters are out of range.
+    pub fn build(&self, profile: &Profile, progress: &(dyn Fn(f32) + Sync)) -> Result<PaintFile, WorkshopError> {
+        let mut paint = self.base();
+        let mut provenance = Provenance { source: "sample".to_owned(), ..Provenance::default() };
+        provenance.notes.insert("base".to_owned(), "Günther et al., VMV 2005, table of fits".to_owned());
+        let (mut clustering, mut warnings) = (None, Vec::new());
+        if let Some(sparkle) = self.flakes {
+            let tell = |done: usize, of: usize| {
+                #[allow(clippy::cast_precision_loss)] // a progress bar
+                progress(done as f32 / of as f32);
+                ControlFlow::Continue(())
+            };
+            let fitted = simulate_flakes(&paint, &sparkle.recipe(), &profile.flakes, &tell)
+                .map_err(|e| WorkshopError::usage("clusters", e))?;
+            paint.flakes = Some(fitted.flakes);
+            clustering = Some(fitted.clustering);
+            warnings = fitted.warnings;
+            warnings.push("the flakes are simulated, not measured".to_owned());
+            provenance.simulated_flakes = true;
+        }
+        Ok(finish(self.name.to_owned(), provenance, paint, None, clustering, warnings))
+    }
+}
+
+impl Sparkle {
+    fn recipe(&self) -> FlakeRecipe {
+        FlakeRecipe {
+            per_mm2: self.per_mm2,
+            radius_um: self.radius_um,
+            tilt: self.tilt,
+            seed: self.seed,
+            ..FlakeRecipe::default()
+        }
     }
 }

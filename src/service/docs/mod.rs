@@ -5,7 +5,6 @@ use std::sync::LazyLock;
 
 use axum::extract::MatchedPath;
 use axum::http::{HeaderName, Method, header};
-use axum::response::Redirect;
 use utoipa::OpenApi;
 use utoipa::openapi::PathItem;
 
@@ -84,11 +83,6 @@ fn methods(item: &PathItem) -> String {
 /// `/openapi.json`
 pub async fn openapi() -> Answer {
     Answer::bytes("application/json", interface(), Keep::Revalidated)
-}
-
-/// `/`
-pub async fn home() -> Redirect {
-    Redirect::temporary("/docs")
 }
 
 /// `/docs`
