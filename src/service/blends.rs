@@ -50,7 +50,7 @@ struct BlendRequest {
 /// correspondence is found once, however many ask. Another order of the same paints is another blend, whose weights
 /// follow that order, of the same correspondence.
 #[utoipa::path(
-    post, path = "/v1/blends", tag = "blends",
+    post, operation_id = "create_blend", path = "/v1/blends", tag = "blends",
     params(("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`")),
     request_body = BlendOrder,
     responses(
@@ -174,7 +174,7 @@ impl Shelved {
 
 /// What is known about a blend.
 #[utoipa::path(
-    get, path = "/v1/blends/{id}", tag = "blends", params(("id" = String, Path, description = "Blend")),
+    get, operation_id = "show_blend", path = "/v1/blends/{id}", tag = "blends", params(("id" = String, Path, description = "Blend")),
     responses(
         (status = 200, description = "The blend", body = BlendDocument),
         (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),

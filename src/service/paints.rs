@@ -140,7 +140,7 @@ pub(super) fn accuracy(
 /// answers at once. `Prefer: wait=N` waits up to N seconds for the paint; otherwise what takes more than 3 seconds is
 /// answered with the job that goes on.
 #[utoipa::path(
-    post, path = "/v1/paints", tag = "paints", params(IngestQuery,
+    post, operation_id = "upload_paint", path = "/v1/paints", tag = "paints", params(IngestQuery,
         ("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`")),
     request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "The measurement"),
     responses(
@@ -269,7 +269,7 @@ pub(super) async fn forget_upload(app: &App, job: &JobRecord) -> Result<(), Prob
 
 /// List paints.
 #[utoipa::path(
-    get, path = "/v1/paints", tag = "paints", params(ListQuery),
+    get, operation_id = "list_paints", path = "/v1/paints", tag = "paints", params(ListQuery),
     responses(
         (status = 200, description = "A page of paints", body = PaintList),
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
@@ -313,7 +313,7 @@ fn summary(record: PaintRecord) -> PaintSummary {
 ///
 /// Provenance, parameters, fit residuals with their floor, energy certificate, flake statistics, warnings.
 #[utoipa::path(
-    get, path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    get, operation_id = "show_paint", path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 200, description = "The paint", body = PaintDocument),
         (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
@@ -327,7 +327,7 @@ pub async fn show(State(app): State<App>, Address(id): Address<String>, _: NoQue
 
 /// A paint as a `.paint` file.
 #[utoipa::path(
-    get, path = "/v1/paints/{id}/paint", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    get, operation_id = "paint_file", path = "/v1/paints/{id}/paint", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 200, description = "The file", body = Vec<u8>, content_type = "application/vnd.carpaint.paint"),
         (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
@@ -343,7 +343,7 @@ pub async fn file(State(app): State<App>, Address(id): Address<String>, _: NoQue
 
 /// The measurement a paint was made of: the very bytes that were uploaded.
 #[utoipa::path(
-    get, path = "/v1/paints/{id}/measurement", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    get, operation_id = "paint_measurement", path = "/v1/paints/{id}/measurement", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 200, description = "The bytes", body = Vec<u8>, content_type = "application/octet-stream"),
         (status = 404, description = "There is no such paint, or it had no measurement", body = ProblemDocument, content_type = "application/problem+json"),
@@ -361,7 +361,7 @@ pub async fn measurement(State(app): State<App>, Address(id): Address<String>, _
 
 /// Delete a paint with its measurement. Blends that were made of it stay.
 #[utoipa::path(
-    delete, path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    delete, operation_id = "delete_paint", path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 204, description = "It is gone"),
         (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),

@@ -80,7 +80,7 @@ impl ViewQuery {
 
 /// A picture of a blend at some weights.
 #[utoipa::path(
-    get, path = "/v1/blends/{id}/preview.{format}", tag = "previews",
+    get, operation_id = "preview_blend", path = "/v1/blends/{id}/preview.{format}", tag = "previews",
     params(("id" = String, Path, description = "Blend"), ("format" = PictureFormat, Path, description = "Picture"), WeightQuery, ViewQuery),
     responses(
         (status = 200, description = "The picture", content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
@@ -101,7 +101,7 @@ pub async fn of_blend(
 
 /// A picture of a paint.
 #[utoipa::path(
-    get, path = "/v1/paints/{id}/preview.{format}", tag = "previews",
+    get, operation_id = "preview_paint", path = "/v1/paints/{id}/preview.{format}", tag = "previews",
     params(("id" = String, Path, description = "Paint"), ("format" = PictureFormat, Path, description = "Picture"), ViewQuery),
     responses(
         (status = 200, description = "The picture", content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),

@@ -80,6 +80,7 @@ pub fn router(app: App) -> Router {
         .route("/openapi.json", get(docs::openapi))
         .route("/problems/{kind}", get(docs::problem))
         .fallback(|| async { axum::http::StatusCode::NOT_FOUND })
+        .method_not_allowed_fallback(docs::method_not_allowed)
         // Uploads hold themselves to their own limit, piece by piece.
         .layer(DefaultBodyLimit::max(JSON_BYTES))
         .layer(middleware::from_fn_with_state(app.clone(), envelope))
