@@ -8,9 +8,17 @@
 //!                              transport             └────────▶ render ─▶ PNG, EXR
 //! ```
 
+pub mod accuracy;
 pub mod blend;
+pub mod cli;
 pub mod color;
+pub mod export;
 pub mod fit;
 pub mod measurement;
 pub mod paint;
+pub mod render;
+pub mod service;
+pub mod store;
+pub mod studio;
 pub mod transport;
+pub mod workshop;

@@ -1,1 +1,7 @@
-fn main() {}
+//! The `carpaint` binary: see [`carpaint::cli`].
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    carpaint::cli::run()
+}

@@ -165,6 +165,16 @@ impl Blend {
         self.paints.is_empty()
     }
 
+    /// The same blend asked for in another order: its `k`-th paint is the `order[k]`-th of before.
+    ///
+    /// # Panics
+    ///
+    /// When `order` names a paint that is not there.
+    #[must_use]
+    pub fn in_order(self, order: &[usize]) -> Self {
+        Self { asked: order.iter().map(|&k| self.asked[k]).collect(), ..self }
+    }
+
     /// Name and content hash of each paint, in the order asked for.
     pub fn ingredients(&self) -> impl Iterator<Item = (&str, &str)> + Clone {
         self.asked.iter().map(|&k| (self.paints[k].name.as_str(), self.paints[k].hash.as_str()))

@@ -48,6 +48,12 @@ pub(crate) fn expand(f: f64) -> f64 {
     if f > KNEE { f * f * f } else { 3.0 * KNEE * KNEE * (f - 4.0 / 29.0) }
 }
 
+/// [`expand`] at texel precision.
+pub(crate) fn expand_f32(f: f32) -> f32 {
+    const KNEE: f32 = 6.0 / 29.0;
+    if f > KNEE { f * f * f } else { 3.0 * KNEE * KNEE * (f - 4.0 / 29.0) }
+}
+
 impl Lab {
     /// Lab of an XYZ color under a white point.
     #[must_use]

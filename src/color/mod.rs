@@ -12,7 +12,7 @@ mod rgb;
 mod white;
 
 pub use difference::ciede2000;
-pub(crate) use lab::{KNEE, expand};
+pub(crate) use lab::{KNEE, expand, expand_f32};
 pub use lab::{Lab, ReadingLab};
 pub use rgb::{LinearRgb, luminance, rgb_to_xyz, xyz_to_rgb};
 pub use white::{D65_2, Illuminant, Observer, WhitePoint};

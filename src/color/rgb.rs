@@ -32,13 +32,18 @@ const fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     out
 }
 
-fn times(m: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
-    m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+const fn times(m: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
+    let [x, y, z] = m;
+    [
+        x[0] * v[0] + x[1] * v[1] + x[2] * v[2],
+        y[0] * v[0] + y[1] * v[1] + y[2] * v[2],
+        z[0] * v[0] + z[1] * v[1] + z[2] * v[2],
+    ]
 }
 
 /// XYZ (`Y = 1` for the perfect diffuser) of a linear sRGB color.
 #[must_use]
-pub fn rgb_to_xyz(rgb: LinearRgb) -> [f64; 3] {
+pub const fn rgb_to_xyz(rgb: LinearRgb) -> [f64; 3] {
     times(&TO_XYZ, rgb)
 }
 

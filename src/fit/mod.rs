@@ -2,17 +2,29 @@
 //!
 //! [`fit_base`] turns a measured reflectance into diffuse, lobes and color table, with an explicit coat where the
 //! measurement asks for one: the lobes carry the shape, the table carries the color. It says how far the result is
-//! from the measurement and how near anything of its form could come.
+//! from the measurement and how near anything of its form could come. [`fit_flakes`] turns pictures of flakes into color
+//! clusters per angle pair, with their grain and lifetime; [`simulate_flakes`] makes such pictures up where none were
+//! taken.
 //!
 //! Nothing here draws random numbers from outside: the same measurement gives the same bits on any machine of one
 //! kind, whatever the number of threads. Left to others: reading files (`measurement`), the reflectance itself
 //! (`paint`).
 
 mod base;
+mod clusters;
 mod color_table;
 mod directions;
+mod flakes;
+mod grain;
 mod least_squares;
+mod lifetime;
 mod lobes;
+mod reduce;
 mod residual;
+mod simulate;
 
 pub use base::{CoatChoice, FitError, FittedBase, fit_base};
+pub use clusters::{BoxRule, ClusterSettings, Clusterer, NoTexel, SliceClusters};
+pub use flakes::{FittedFlakes, FlakeFitError, Progress, fit_flakes};
+pub use reduce::reduce_clusters;
+pub use simulate::{FlakeRecipe, simulate_flakes};

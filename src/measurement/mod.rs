@@ -8,14 +8,22 @@
 //! Bare `.bsdf`, MPI and MERL files are measured in air and include everything the sample did to light, the clear
 //! coat's highlight as well. Left to others: turning a measurement into a paint (`fit`).
 
+mod archive;
+mod manifest;
 mod merl;
 mod mpi;
+mod package;
+mod picture;
 mod rgl;
 mod table;
 mod tensor;
 
 pub use merl::read_merl;
 pub use mpi::{MPI_HEADER_BYTES, read_mpi};
+pub use package::{
+    FlakePictures, FlakeSlices, MultiAngle, Package, PackageBase, PackageError, SliceRoom, TableLayout,
+};
+pub use picture::{Picture, PictureError, PictureScratch};
 pub use rgl::{RglError, RglMeasurement};
 pub(crate) use table::half_frame_pair;
 pub use table::{HalfAngleTable, TableError, ThetaHSpacing};

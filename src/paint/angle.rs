@@ -112,6 +112,54 @@ impl AngleGrid {
     }
 }
 
+/// An angle grid prepared for millions of look-ups in single precision.
+#[derive(Clone, Debug)]
+pub(crate) struct QuickGrid {
+    degrees: Vec<f32>,
+    /// Last angle at or below each half degree.
+    start: Vec<u32>,
+}
+
+/// [`Bracket`] in single precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct QuickBracket {
+    pub(crate) low: usize,
+    pub(crate) high: usize,
+    pub(crate) fraction: f32,
+}
+
+impl QuickGrid {
+    #[allow(clippy::cast_possible_truncation)] // degrees to texel precision, indices of few angles
+    pub(crate) fn new(grid: &AngleGrid) -> Self {
+        let degrees: Vec<f32> = grid.degrees.iter().map(|&d| d as f32).collect();
+        let start = (0..=180_u16).map(|half| {
+            let at = f32::from(half) / 2.0;
+            degrees.partition_point(|&d| d <= at).saturating_sub(1) as u32
+        });
+        Self { start: start.collect(), degrees }
+    }
+
+    pub(crate) const fn len(&self) -> usize {
+        self.degrees.len()
+    }
+
+    /// Finds an angle in degrees between its neighbours; outside the range the border angle holds.
+    #[inline]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, clamped to the table
+    pub(crate) fn bracket(&self, angle_deg: f32) -> QuickBracket {
+        let mut low = self.start[((angle_deg * 2.0) as usize).min(180)] as usize;
+        let last = self.degrees.len() - 1;
+        while low < last && self.degrees[low + 1] <= angle_deg {
+            low += 1;
+        }
+        if low == last {
+            return QuickBracket { low, high: low, fraction: 0.0 };
+        }
+        let (below, above) = (self.degrees[low], self.degrees[low + 1]);
+        QuickBracket { low, high: low + 1, fraction: ((angle_deg - below) / (above - below)).max(0.0) }
+    }
+}
+
 impl TryFrom<Vec<f64>> for AngleGrid {
     type Error = AngleGridError;
     fn try_from(degrees: Vec<f64>) -> Result<Self, AngleGridError> {
@@ -135,6 +183,24 @@ mod tests {
         assert_eq!(error, AngleGridError::Order { index: 2, value: 5.0, before: 5.0 });
         assert!(AngleGrid::new(vec![f64::NAN]).is_err());
         assert!(AngleGrid::new(vec![0.0, 90.1]).is_err());
+    }
+
+    #[test]
+    fn the_quick_grid_finds_the_same_neighbours() {
+        for degrees in [vec![0.0], vec![10.0, 20.0], vec![0.0, 0.1, 0.2, 0.7, 33.3, 66.0], vec![90.0]] {
+            let grid = AngleGrid::new(degrees).expect("ascending");
+            let quick = QuickGrid::new(&grid);
+            for step in 0..1000_u16 {
+                let angle = f64::from(step) * 0.095;
+                #[allow(clippy::cast_possible_truncation)]
+                let (want, got) = (grid.bracket(angle), quick.bracket(angle as f32));
+                let at = |low: usize, fraction: f64| {
+                    let high = (low + 1).min(grid.len() - 1);
+                    grid.degrees()[low] * (1.0 - fraction) + grid.degrees()[high] * fraction
+                };
+                assert!((at(want.low, want.fraction) - at(got.low, f64::from(got.fraction))).abs() < 1e-4, "{angle}");
+            }
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@
 //! `m³ + 3m·var`, wholly below it is linear: both exact, and what nearly every box takes. Only a box across the knee
 //! needs the integrals, and where it is also thin the differences cancel: there 4-point Gauss is used.
 
-use crate::color::{D65_2, KNEE, LinearRgb, expand, xyz_to_rgb};
+use crate::color::{D65_2, KNEE, LinearRgb, expand, rgb_to_xyz, xyz_to_rgb};
 
 /// Half width below which differences of P2 lose more than Gauss quadrature does.
 const THIN: f64 = 2e-3;
@@ -31,6 +31,59 @@ pub fn mean_color(lower: [f32; 3], upper: [f32; 3]) -> LinearRgb {
         D65_2.y * mean_of_sum(y, dy, 0.0),
         D65_2.z * mean_of_sum(y - v, dy, dv),
     ])
+}
+
+/// Middle of the box of these half widths in Lab whose mean linear sRGB this is: the inverse of [`mean_color`].
+///
+/// `near` is a guess, the closer the faster. The mean of a box grows strictly with its middle, so there is one answer.
+#[must_use]
+pub fn center_of_mean(half: [f64; 3], mean: LinearRgb, near: [f64; 3]) -> [f64; 3] {
+    let xyz = rgb_to_xyz(mean);
+    let (dy, du, dv) = (half[0] / 116.0, half[1] / 500.0, half[2] / 200.0);
+    let y = (near[0] + 16.0) / 116.0;
+    let x = middle_of_mean(xyz[0] / D65_2.x, dy, du, y + near[1] / 500.0);
+    let z = middle_of_mean(xyz[2] / D65_2.z, dy, dv, y - near[2] / 200.0);
+    let y = middle_of_mean(xyz[1] / D65_2.y, dy, 0.0, y);
+    [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+}
+
+/// The `m` at which [`mean_of_sum`] is `t`: secant steps from a guess, held in a bracket.
+fn middle_of_mean(t: f64, ds: f64, dt: f64, near: f64) -> f64 {
+    let reach = ds + dt;
+    let dark = t / (3.0 * KNEE * KNEE) + 4.0 / 29.0;
+    if dark + reach <= KNEE {
+        return dark;
+    }
+    // The compression's inverse is convex and above its own tangent at the knee: its mean over a box is at least its
+    // value in the middle and at most its value at the upper end.
+    let value = if t > KNEE.powi(3) { t.cbrt() } else { dark };
+    let (mut low, mut high) = (value - reach, value);
+    let tolerance = 2.0 * f64::EPSILON * (t.abs() + KNEE.powi(3));
+    let mut m = near.clamp(low, high);
+    let mut miss = mean_of_sum(m, ds, dt) - t;
+    let mut slope = 3.0 * m.max(KNEE).powi(2) + ds * ds + dt * dt;
+    for _ in 0..100 {
+        if miss.abs() <= tolerance {
+            break;
+        }
+        if miss > 0.0 {
+            high = m;
+        } else {
+            low = m;
+        }
+        let step = m - miss / slope;
+        let next = if step > low && step < high { step } else { f64::midpoint(low, high) };
+        if next == m {
+            break;
+        }
+        let after = mean_of_sum(next, ds, dt) - t;
+        let secant = (after - miss) / (next - m);
+        if secant > 0.0 {
+            slope = secant;
+        }
+        (m, miss) = (next, after);
+    }
+    m
 }
 
 /// Mean of the inverse compression of `m + s + t`, `s` and `t` uniform with half widths `ds`, `dt`.
@@ -106,6 +159,27 @@ mod tests {
         let want = Lab::from(lab.map(f64::from)).to_rgb();
         for (x, y) in mean_color(lab, lab).iter().zip(want) {
             assert!((x - y).abs() < 1e-15);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_middle_of_a_mean_gives_that_mean(
+            center in prop::array::uniform3(-60.0..400.0_f64), log_half in prop::array::uniform3(-4.0..2.0_f64),
+            guess in -50.0..50.0_f64,
+        ) {
+            let half = log_half.map(|h| 10.0_f64.powf(h));
+            // Corners that an f32 holds exactly, so that only the inversion is judged.
+            let lower: [f32; 3] = std::array::from_fn(|k| (center[k] - half[k]) as f32);
+            let upper: [f32; 3] = std::array::from_fn(|k| (center[k] + half[k]) as f32);
+            let middle: [f64; 3] = std::array::from_fn(|k| f64::midpoint(f64::from(lower[k]), f64::from(upper[k])));
+            let exact: [f64; 3] = std::array::from_fn(|k| (f64::from(upper[k]) - f64::from(lower[k])) / 2.0);
+            let found = center_of_mean(exact, mean_color(lower, upper), middle.map(|m| m + guess));
+            // The mean carries some eps of the cube of f (10 at most); its slope is 3 KNEE² at the least, and a, b
+            // multiply f by 500 and 200. In thin boxes across the knee P2 loses digits: see THIN.
+            for k in 0..3 {
+                prop_assert!((found[k] - middle[k]).abs() < 1e-6, "{found:?} {middle:?}");
+            }
         }
     }
 

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::angle::{AngleGrid, Bracket};
+use super::direction::HalfAngles;
 use crate::color::{Lab, LinearRgb};
 
 /// Color of the base by angle.
@@ -118,8 +119,21 @@ fn on_node(bracket: Bracket) -> Option<usize> {
     (bracket.fraction == 0.0).then_some(bracket.low)
 }
 
+/// Value of a table of colors, θd fastest, at the angles of a pair of directions: bilinear between its nodes, the border
+/// nodes' outside them.
+///
+/// # Panics
+///
+/// When the table has not one color per angle pair.
+#[must_use]
+pub fn at_angles(table: &[LinearRgb], theta_h: &AngleGrid, theta_d: &AngleGrid, half: &HalfAngles) -> LinearRgb {
+    let row = theta_h.bracket(half.theta_h.to_degrees());
+    let column = theta_d.bracket(half.theta_d.to_degrees());
+    bilinear(table, theta_d.len(), row, column)
+}
+
 /// Bilinear value of a row-major table of colors.
-pub(crate) fn bilinear(table: &[LinearRgb], columns: usize, row: Bracket, column: Bracket) -> LinearRgb {
+fn bilinear(table: &[LinearRgb], columns: usize, row: Bracket, column: Bracket) -> LinearRgb {
     let at = |r: usize, c: usize| table[r * columns + c];
     let (u, v) = (row.fraction, column.fraction);
     let corners =

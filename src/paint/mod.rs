@@ -12,6 +12,7 @@
 
 mod angle;
 mod box_color;
+mod cells;
 mod coat;
 mod color_table;
 mod container;
@@ -26,10 +27,12 @@ mod residuals;
 mod sparkle;
 mod validate;
 
+pub(crate) use angle::{QuickBracket, QuickGrid};
 pub use angle::{AngleGrid, AngleGridError, Bracket};
-pub use box_color::mean_color;
+pub use box_color::{center_of_mean, mean_color};
+pub use cells::{RandomTexture, cell_spacing};
 pub use coat::{Coat, fresnel, refract};
-pub use color_table::{ColorTable, ColorTableError};
+pub use color_table::{ColorTable, ColorTableError, at_angles};
 pub use container::{Container, ContainerError, Reader, Writer};
 pub use direction::{ASPECULAR_DEG, Direction, HalfAngles, half_angles, instrument_pairs};
 pub use energy::{EnergyCertificate, certify};
@@ -39,7 +42,7 @@ pub use limits::Limits;
 pub use lobe::Lobe;
 pub use reflectance::{Chi, Reflectance, Terms};
 pub use residuals::{FitResiduals, InstrumentError, LuminanceError};
-pub use sparkle::{FlakeSampler, RandomTexture, TexelDraw, cell_spacing};
+pub use sparkle::{FlakeSampler, TexelDraw};
 pub use validate::{MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError};
 
 use crate::color::LinearRgb;

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use super::CarPaint;
 use super::coat::{fresnel, refract};
-use super::color_table::bilinear;
+use super::color_table::at_angles;
 use super::direction::{Direction, HalfAngles, half_angles};
 use crate::color::LinearRgb;
 
@@ -125,9 +125,7 @@ impl<'a> Reflectance<'a> {
             Chi::Overall => self.overall,
             Chi::Table => {
                 let table = &self.paint.color_table;
-                let row = table.theta_h().bracket(half.theta_h.to_degrees());
-                let column = table.theta_d().bracket(half.theta_d.to_degrees());
-                bilinear(&self.chi, table.theta_d().len(), row, column)
+                at_angles(&self.chi, table.theta_h(), table.theta_d(), half)
             }
         };
         std::array::from_fn(|k| color[k] * sum[k])
@@ -135,8 +133,6 @@ impl<'a> Reflectance<'a> {
 
     fn mean_flakes(&self, half: &HalfAngles) -> LinearRgb {
         let Some(flakes) = &self.paint.flakes else { return [0.0; 3] };
-        let row = flakes.theta_h.bracket(half.theta_h.to_degrees());
-        let column = flakes.theta_d.bracket(half.theta_d.to_degrees());
-        bilinear(&self.flake_means, flakes.theta_d.len(), row, column)
+        at_angles(&self.flake_means, &flakes.theta_h, &flakes.theta_d, half)
     }
 }

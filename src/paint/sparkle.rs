@@ -1,17 +1,16 @@
-//! The random texture: which flake a texel of the paint shows.
+//! Which flake a texel of the paint shows.
 //!
-//! A texel carries one 32-bit number that it shares with its *cell*, the nearest of the jittered points of a grid
-//! (a Voronoi cell about a flake wide). Two texels therefore show the same flake with the probability that they share a
-//! cell, whatever the histogram: the texels' autocorrelation is the paint's grain. The number is hashed with two
-//! *epochs*, `floor(θ/persistence + phase)` with a phase per cell: the probability that a cell still shows the same
-//! flake after `Δθ` is `1 − Δθ/persistence`, which gives the lifetime. From the hash come the number that picks a
-//! cluster by cumulative probability, and three that place the color in its box.
+//! A texel carries the number of its cell ([`RandomTexture`](super::RandomTexture)). It is hashed with two *epochs*,
+//! `floor(θ/persistence + phase)` with a phase per cell: the probability that a cell still shows the same flake after
+//! `Δθ` is `1 − Δθ/persistence`, which gives the lifetime. From the hash come the number that picks a cluster by
+//! cumulative probability, and three that place the color in its box.
 //!
 //! All of it is 32-bit integer arithmetic, so that a shader draws the very same flakes. The mixing step is
 //! PCG-RXS-M-XS (M. O'Neill, 2014). Hash by the texel on the paint, never by the pixel or the frame.
 
+use super::angle::QuickGrid;
 use super::flakes::{FlakeTexture, Flakes};
-use crate::color::Lab;
+use crate::color::{D65_2, expand_f32, xyz_to_rgb};
 
 /// One step of the permuted congruential generator: every bit of the answer depends on every bit of `x`.
 #[must_use]
@@ -29,124 +28,6 @@ pub(crate) fn unit(x: u32) -> f32 {
     (top + 0.5) / 16_777_216.0
 }
 
-/// A tile of cell numbers that repeats over the paint.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RandomTexture {
-    width: u32,
-    height: u32,
-    cells: Vec<u32>,
-}
-
-impl RandomTexture {
-    /// A tile of `width x height` texels whose cells are `spacing` texels apart (see [`cell_spacing`]).
-    ///
-    /// Sizes are at least 1; the same arguments give the same tile on every machine.
-    #[must_use]
-    pub fn new(width: u32, height: u32, spacing: f64, seed: u32) -> Self {
-        let grid = CellGrid::new(width.max(1), height.max(1), spacing, seed);
-        let cells = (0..grid.height).flat_map(|y| (0..grid.width).map(move |x| (x, y)));
-        Self { width: grid.width, height: grid.height, cells: cells.map(|(x, y)| grid.cell_of(x, y)).collect() }
-    }
-
-    /// Texels across.
-    #[must_use]
-    pub const fn width(&self) -> u32 {
-        self.width
-    }
-
-    /// Texels down.
-    #[must_use]
-    pub const fn height(&self) -> u32 {
-        self.height
-    }
-
-    /// The numbers, row by row.
-    #[must_use]
-    pub fn cells(&self) -> &[u32] {
-        &self.cells
-    }
-
-    /// Number of a texel anywhere on the paint. Every repetition of the tile gets numbers of its own.
-    #[must_use]
-    pub fn at(&self, x: i32, y: i32) -> u32 {
-        let (w, h) = (self.width.cast_signed(), self.height.cast_signed());
-        let (tile_x, tile_y) = (x.div_euclid(w), y.div_euclid(h));
-        let inside = y.rem_euclid(h) * w + x.rem_euclid(w);
-        let cell = self.cells[inside.cast_unsigned() as usize];
-        if (tile_x, tile_y) == (0, 0) {
-            return cell;
-        }
-        mix(cell ^ mix(tile_x.cast_unsigned().wrapping_add(mix(tile_y.cast_unsigned()))))
-    }
-}
-
-struct CellGrid {
-    width: u32,
-    height: u32,
-    columns: u32,
-    rows: u32,
-    step: [f64; 2],
-    seed: u32,
-}
-
-impl CellGrid {
-    fn new(width: u32, height: u32, spacing: f64, seed: u32) -> Self {
-        // A whole number of cells across, so that the tile has no seam.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to 1..=8 per texel
-        let count = |size: u32| (f64::from(size) / spacing.max(0.125)).round().clamp(1.0, 8.0 * f64::from(size)) as u32;
-        let (columns, rows) = (count(width), count(height));
-        let step = [f64::from(width) / f64::from(columns), f64::from(height) / f64::from(rows)];
-        Self { width, height, columns, rows, step, seed }
-    }
-
-    fn cell_of(&self, x: u32, y: u32) -> u32 {
-        let (px, py) = ((f64::from(x) + 0.5) / self.step[0], (f64::from(y) + 0.5) / self.step[1]);
-        #[allow(clippy::cast_possible_truncation)] // a grid coordinate
-        let (cx, cy) = (px.floor() as i64, py.floor() as i64);
-        let (mut nearest, mut number) = (f64::INFINITY, 0);
-        for dy in -2..=2 {
-            for dx in -2..=2 {
-                let column = (cx + dx).rem_euclid(i64::from(self.columns));
-                let row = (cy + dy).rem_euclid(i64::from(self.rows));
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below columns * rows <= 2^32
-                let key = (row * i64::from(self.columns) + column) as u32;
-                let hash = mix(key ^ mix(self.seed));
-                #[allow(clippy::cast_precision_loss)] // small integers
-                let (sx, sy) = (
-                    (cx + dx) as f64 + f64::from(unit(mix(hash ^ 0x68bc_21eb))),
-                    (cy + dy) as f64 + f64::from(unit(mix(hash ^ 0x02e5_be93))),
-                );
-                let distance = ((sx - px) * self.step[0]).powi(2) + ((sy - py) * self.step[1]).powi(2);
-                if distance < nearest {
-                    (nearest, number) = (distance, hash);
-                }
-            }
-        }
-        number
-    }
-}
-
-/// Spacing of cells, in texels, whose autocorrelation falls to one half at `grain` texels.
-///
-/// Independent texels fall to one half at 0.5 texels (linear between lags 0 and 1); a grain below that is what
-/// independent texels give. Found by measuring tiles of many spacings; a test measures them again.
-#[must_use]
-pub fn cell_spacing(grain: f64) -> f64 {
-    let last = SPACING_OF_GRAIN.len() - 1;
-    if grain >= SPACING_OF_GRAIN[last].0 {
-        return grain * SPACING_OF_GRAIN[last].1 / SPACING_OF_GRAIN[last].0;
-    }
-    let above = SPACING_OF_GRAIN.partition_point(|&(g, _)| g <= grain);
-    if above == 0 {
-        return SPACING_OF_GRAIN[0].1;
-    }
-    let ((g0, s0), (g1, s1)) = (SPACING_OF_GRAIN[above - 1], SPACING_OF_GRAIN[above]);
-    s0 + (s1 - s0) * (grain - g0) / (g1 - g0)
-}
-
-/// (distance of half autocorrelation, spacing), both in texels, of tiles of 512 x 512.
-const SPACING_OF_GRAIN: [(f64, f64); 2] = [(0.5, 0.125), (4.0, 8.0)];
-
 /// The random numbers of one cell at one angle pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TexelDraw {
@@ -159,6 +40,7 @@ pub struct TexelDraw {
 impl TexelDraw {
     /// Numbers of a cell while the angles, in degrees, stay within its epochs.
     #[must_use]
+    #[inline]
     pub fn of(cell: u32, theta_h_deg: f32, theta_d_deg: f32, persistence_deg: [f32; 2]) -> Self {
         let epoch = |theta: f32, persistence: f32, salt: u32| {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most 90 / 0.01
@@ -175,27 +57,73 @@ impl TexelDraw {
     }
 }
 
-/// Flakes prepared for drawing: cumulative probabilities per slice.
+/// Flakes prepared for drawing: cumulative probabilities, boxes along the axes of the cube roots, angles to look up.
 #[derive(Clone, Debug)]
 pub struct FlakeSampler<'a> {
     flakes: &'a Flakes,
+    theta_h: QuickGrid,
+    theta_d: QuickGrid,
+    persistence: [f32; 2],
     cumulative: Vec<f32>,
+    /// For every slice and part of the unit interval the cluster to start looking from.
+    guide: Vec<u32>,
+    boxes: Vec<RootBox>,
+    /// Closed-form mean of every slice.
+    means: Vec<[f32; 3]>,
+    /// Linear sRGB in 1/sr of the three expanded roots.
+    to_rgb: [[f32; 3]; 3],
 }
+
+/// A box in `fy`, `a/500`, `b/200`: the smallest corner, and the way to the largest.
+#[derive(Clone, Copy, Debug)]
+struct RootBox {
+    lower: [f32; 3],
+    extent: [f32; 3],
+}
+
+/// Parts of the unit interval in the guide to the clusters of a slice.
+const GUIDED: u16 = 64;
 
 impl<'a> FlakeSampler<'a> {
     /// Prepares flakes: one pass over the clusters.
     #[must_use]
+    #[allow(clippy::cast_possible_truncation)] // texel precision is f32
     pub fn new(flakes: &'a Flakes) -> Self {
-        let mut cumulative = Vec::with_capacity(flakes.clusters());
+        let mut cumulative: Vec<f32> = Vec::with_capacity(flakes.clusters());
+        let mut guide = Vec::with_capacity(flakes.slices() * usize::from(GUIDED));
         for k in 0..flakes.slices() {
-            let mut sum = 0.0;
-            #[allow(clippy::cast_possible_truncation)] // a probability at texel precision
+            let (mut sum, first) = (0.0, cumulative.len());
             cumulative.extend(flakes.slice_at(k).probability.iter().map(|p| {
                 sum += p;
                 sum as f32
             }));
+            let slice = &cumulative[first..];
+            let part = |j: u16| f32::from(j) / f32::from(GUIDED);
+            guide.extend((0..GUIDED).map(|j| slice.partition_point(|&c| c <= part(j)).min(slice.len() - 1) as u32));
         }
-        Self { flakes, cumulative }
+        let root = |lab: &[f32; 3]| [(lab[0] + 16.0) / 116.0, lab[1] / 500.0, lab[2] / 200.0];
+        let boxes = flakes.lower.iter().zip(&flakes.upper).map(|(lower, upper)| {
+            let (lower, upper) = (root(lower), root(upper));
+            RootBox { lower, extent: std::array::from_fn(|k| upper[k] - lower[k]) }
+        });
+        let column = |xyz: [f64; 3]| xyz_to_rgb(xyz).map(|v| (v / std::f64::consts::PI) as f32);
+        Self {
+            flakes,
+            theta_h: QuickGrid::new(&flakes.theta_h),
+            theta_d: QuickGrid::new(&flakes.theta_d),
+            persistence: flakes.texture.persistence_deg.map(|p| p as f32),
+            cumulative,
+            guide,
+            boxes: boxes.collect(),
+            means: (0..flakes.slices()).map(|k| flakes.slice_at(k).mean().map(|v| v as f32)).collect(),
+            to_rgb: [column([D65_2.x, 0.0, 0.0]), column([0.0, D65_2.y, 0.0]), column([0.0, 0.0, D65_2.z])],
+        }
+    }
+
+    /// Cumulative probabilities of all clusters, slice by slice, as draws compare them.
+    #[must_use]
+    pub fn cumulative(&self) -> &[f32] {
+        &self.cumulative
     }
 
     /// Size and persistence of these flakes.
@@ -206,36 +134,44 @@ impl<'a> FlakeSampler<'a> {
 
     /// Flake reflectance of a cell in 1/sr at an angle pair in degrees, bilinear between slices, not clamped.
     #[must_use]
-    #[allow(clippy::cast_possible_truncation)] // texel precision is f32
-    pub fn color(&self, cell: u32, theta_h_deg: f64, theta_d_deg: f64) -> [f32; 3] {
-        let persistence = self.flakes.texture.persistence_deg.map(|p| p as f32);
-        let draw = TexelDraw::of(cell, theta_h_deg as f32, theta_d_deg as f32, persistence);
-        let row = self.flakes.theta_h.bracket(theta_h_deg);
-        let column = self.flakes.theta_d.bracket(theta_d_deg);
-        let (u, v) = (row.fraction as f32, column.fraction as f32);
-        let mut sum = [0.0; 3];
-        for (h, wh) in [(row.low, 1.0 - u), (row.high, u)] {
-            for (d, wd) in [(column.low, 1.0 - v), (column.high, v)] {
+    pub fn color(&self, cell: u32, theta_h_deg: f32, theta_d_deg: f32) -> [f32; 3] {
+        self.color_and_mean(cell, theta_h_deg, theta_d_deg).0
+    }
+
+    /// [`FlakeSampler::color`], and the mean over all cells at the same angles.
+    #[must_use]
+    pub fn color_and_mean(&self, cell: u32, theta_h_deg: f32, theta_d_deg: f32) -> ([f32; 3], [f32; 3]) {
+        let draw = TexelDraw::of(cell, theta_h_deg, theta_d_deg, self.persistence);
+        let (row, column) = (self.theta_h.bracket(theta_h_deg), self.theta_d.bracket(theta_d_deg));
+        let columns = self.flakes.theta_d.len();
+        let (mut sum, mut mean) = ([0.0; 3], [0.0; 3]);
+        for (h, wh) in [(row.low, 1.0 - row.fraction), (row.high, row.fraction)] {
+            for (d, wd) in [(column.low, 1.0 - column.fraction), (column.high, column.fraction)] {
                 if wh * wd > 0.0 {
-                    let color = self.draw(h * self.flakes.theta_d.len() + d, draw);
+                    let slice = h * columns + d;
+                    let drawn = self.draw(slice, draw);
                     for k in 0..3 {
-                        sum[k] += wh * wd * color[k];
+                        sum[k] += wh * wd * drawn[k];
+                        mean[k] += wh * wd * self.means[slice][k];
                     }
                 }
             }
         }
-        sum
+        let rgb = |k| sum[0] * self.to_rgb[0][k] + sum[1] * self.to_rgb[1][k] + sum[2] * self.to_rgb[2][k];
+        (std::array::from_fn(rgb), mean)
     }
 
-    /// Color of one draw from slice `k`, in 1/sr.
+    /// XYZ over white of one draw from slice `k`.
     fn draw(&self, k: usize, draw: TexelDraw) -> [f32; 3] {
-        let range = self.flakes.offsets[k] as usize..self.flakes.offsets[k + 1] as usize;
-        let cumulative = &self.cumulative[range.clone()];
-        let cluster = range.start + cumulative.partition_point(|&c| c <= draw.pick).min(range.len() - 1);
-        let (lower, upper) = (self.flakes.lower[cluster], self.flakes.upper[cluster]);
-        let at = |axis: usize| lower[axis] + (upper[axis] - lower[axis]) * draw.place[axis];
-        Lab { l: f64::from(at(0)), a: f64::from(at(1)), b: f64::from(at(2)) }
-            .to_rgb()
-            .map(|v| (v / std::f64::consts::PI) as f32)
+        let (first, end) = (self.flakes.offsets[k] as usize, self.flakes.offsets[k + 1] as usize);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below GUIDED, for pick is below 1
+        let part = (draw.pick * f32::from(GUIDED)) as usize;
+        let mut cluster = first + self.guide[k * usize::from(GUIDED) + part] as usize;
+        while cluster + 1 < end && self.cumulative[cluster] <= draw.pick {
+            cluster += 1;
+        }
+        let RootBox { lower, extent } = self.boxes[cluster];
+        let [y, u, v]: [f32; 3] = std::array::from_fn(|axis| lower[axis] + extent[axis] * draw.place[axis]);
+        [expand_f32(y + u), expand_f32(y), expand_f32(y - v)]
     }
 }

@@ -42,7 +42,7 @@ impl Solver for Greedy {
         target_duals.resize(matrix.stride(), [0.0; LANES]);
         for use_means in [false, true] {
             if use_means {
-                mean_costs(matrix, problem.target().len(), target_duals);
+                mean_costs(matrix, units, target_duals);
             }
             source_duals.clear();
             source_duals.extend(matrix.rows().map(|row| row_minimum(row, target_duals)));

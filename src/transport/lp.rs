@@ -73,8 +73,7 @@ fn check_marginals(problem: &Problem, masses: &[f64]) -> Result<(), TransportErr
     let wanted = problem.source().masses().iter().chain(problem.target().masses());
     for (moved, &mass) in sent.chain(received).zip(wanted) {
         let off = moved - mass;
-        // Written so that NaN fails too.
-        if !(off.abs() <= MARGINAL_TOLERANCE) {
+        if off.abs() > MARGINAL_TOLERANCE || off.is_nan() {
             return Err(TransportError::LinearProgram(format!("its answer moves {moved} where the mass is {mass}")));
         }
     }

@@ -98,8 +98,9 @@ impl Scaling {
     fn fit(&mut self, problem: &Problem, matrix: &CostMatrix, epsilon: f64) -> Result<(), TransportError> {
         let (p, q) = (problem.source().masses(), problem.target().masses());
         let (sources, targets) = (p.len(), q.len());
-        let mean =
-            matrix.rows().flat_map(|row| &row.as_flattened()[..targets]).sum::<f64>() / (sources * targets) as f64;
+        #[expect(clippy::cast_precision_loss, reason = "at most 2^24 pairs")]
+        let pairs = (sources * targets) as f64;
+        let mean = matrix.rows().flat_map(|row| &row.as_flattened()[..targets]).sum::<f64>() / pairs;
         for (values, size, value) in [
             (&mut self.f, sources, 0.0),
             (&mut self.g, targets, 0.0),
@@ -116,7 +117,7 @@ impl Scaling {
         loop {
             self.step_on_potentials(p, q, matrix, eta);
             let residual = self.fit_stage(p, q, matrix, eta, &mut steps_left);
-            if !(residual <= Sinkhorn::RESIDUAL) {
+            if residual > Sinkhorn::RESIDUAL || residual.is_nan() {
                 return Err(TransportError::NotConverged {
                     steps: Sinkhorn::MOST_STEPS,
                     residual,

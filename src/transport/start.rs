@@ -38,7 +38,7 @@ pub(super) fn row_minimum(row: &[[f64; LANES]], values: &[[f64; LANES]]) -> f64 
     for (costs, values) in row.iter().zip(values) {
         for lane in 0..LANES {
             let reduced = costs[lane] - values[lane];
-            least[lane] = if reduced < least[lane] { reduced } else { least[lane] };
+            least[lane] = if least[lane] < reduced { least[lane] } else { reduced };
         }
     }
     let mut smallest = least[0];
@@ -101,22 +101,25 @@ pub(super) fn steps_as_flows(steps: &[Closing]) -> impl Iterator<Item = Flow> + 
     })
 }
 
-/// Each target's mean cost over the sources; 0 in the padding.
-pub(super) fn mean_costs(matrix: &CostMatrix, targets: usize, means: &mut [[f64; LANES]]) {
+/// Each target's mean cost over the sources, weighted by their supplies; 0 in the padding.
+pub(super) fn mean_costs(matrix: &CostMatrix, units: &Units, means: &mut [[f64; LANES]]) {
     means.fill([0.0; LANES]);
-    let mut sources = 0.0;
-    for row in matrix.rows() {
-        sources += 1.0;
+    let mut weights = 0.0;
+    for (row, &supply) in matrix.rows().zip(&units.supplies) {
+        #[expect(clippy::cast_precision_loss, reason = "a weight of a guess")]
+        let weight = supply as f64;
+        weights += weight;
         for (costs, sums) in row.iter().zip(&mut *means) {
             for (cost, sum) in costs.iter().zip(sums) {
-                *sum += cost;
+                *sum += weight * cost;
             }
         }
     }
-    let share = 1.0 / sources;
+    // Leftovers of a finished flow can be nothing at all.
+    let share = 1.0 / f64::max(weights, 1.0);
     for (target, mean) in means.as_flattened_mut().iter_mut().enumerate() {
         // The padding costs infinity, and infinity less infinity is no number.
-        *mean = if target < targets { *mean * share } else { 0.0 };
+        *mean = if target < units.demands.len() { *mean * share } else { 0.0 };
     }
 }
 
@@ -126,7 +129,7 @@ pub(super) fn greedy_start(matrix: &CostMatrix, units: &Units, memory: &mut Star
     let sources = units.supplies.len();
     values.clear();
     values.resize(matrix.stride(), [0.0; LANES]);
-    mean_costs(matrix, units.demands.len(), values);
+    mean_costs(matrix, units, values);
     left.clear();
     left.extend_from_slice(&units.demands);
     steps.clear();

@@ -64,8 +64,8 @@ pub(super) fn for_each_point<const W: usize>(words: &[u64; W], mut visit: impl F
 /// A point of the tree, seen from below.
 #[derive(Clone, Copy, Debug)]
 struct Branch<const W: usize> {
-    /// The point on the other side that it hangs from. The root's is itself of no meaning.
-    parent: u32,
+    /// The point on the other side that it hangs from; the root's means nothing.
+    parent: usize,
     /// Grains on the edge to the parent.
     flow: i64,
     /// Itself and all points below.
@@ -89,7 +89,7 @@ pub(super) struct Tree<const W: usize> {
     /// Scratch: for each target the sources below it, for each source the targets below it, and points to visit.
     below_target: Vec<[u64; W]>,
     below_source: Vec<[u64; W]>,
-    queue: Vec<u32>,
+    queue: Vec<usize>,
 }
 
 impl<const W: usize> Tree<W> {
@@ -110,7 +110,7 @@ impl<const W: usize> Tree<W> {
             match step {
                 Closing::Source { closed, parent, grains } => {
                     let branch = &mut self.sources[closed];
-                    branch.parent = parent as u32;
+                    branch.parent = parent;
                     branch.flow = grains;
                     let below = branch.below;
                     self.targets[parent].below.join(&below);
@@ -118,7 +118,7 @@ impl<const W: usize> Tree<W> {
                 }
                 Closing::Target { closed, parent, grains } => {
                     let branch = &mut self.targets[closed];
-                    branch.parent = parent as u32;
+                    branch.parent = parent;
                     branch.flow = grains;
                     let below = branch.below;
                     self.sources[parent].below.join(&below);
@@ -146,13 +146,13 @@ impl<const W: usize> Tree<W> {
                 least = branch.flow;
                 leaving = at;
             }
-            let up = branch.parent as usize;
+            let up = branch.parent;
             source_way += 1;
             let branch = &self.targets[up];
             if holds(&branch.below.targets, target) {
                 break;
             }
-            at = branch.parent as usize;
+            at = branch.parent;
             source_way += 1;
         }
         let mut target_way = 0;
@@ -167,13 +167,13 @@ impl<const W: usize> Tree<W> {
                 leaving = at;
                 with_source = false;
             }
-            let up = branch.parent as usize;
+            let up = branch.parent;
             target_way += 1;
             let branch = &self.sources[up];
             if holds(&branch.below.sources, source) {
                 break;
             }
-            at = branch.parent as usize;
+            at = branch.parent;
             target_way += 1;
         }
         let cycle = Cycle { flow: least, leaving };
@@ -195,18 +195,17 @@ impl<const W: usize> Tree<W> {
         self.list_children();
         target_values[self.root] = 0.0;
         self.queue.clear();
-        self.queue.push(self.root as u32);
+        self.queue.push(self.root);
         let mut visited = 0;
         while let Some(&target) = self.queue.get(visited) {
             visited += 1;
-            let target = target as usize;
             let value = target_values[target];
             for_each_point(&self.below_target[target], |source| {
                 let value = cost(source, target) - value;
                 source_values[source] = value;
                 for_each_point(&self.below_source[source], |target| {
                     target_values[target] = cost(source, target) - value;
-                    self.queue.push(target as u32);
+                    self.queue.push(target);
                 });
             });
         }
@@ -215,7 +214,7 @@ impl<const W: usize> Tree<W> {
     /// Visits all edges with their flows, by source, then target. Call after [`Tree::potentials`].
     pub(super) fn for_each_edge(&self, mut visit: impl FnMut(usize, usize, i64)) {
         for (source, (branch, below)) in self.sources.iter().zip(&self.below_source).enumerate() {
-            let parent = branch.parent as usize;
+            let parent = branch.parent;
             let mut edges = *below;
             insert(&mut edges, parent);
             for_each_point(&edges, |target| {
@@ -231,11 +230,11 @@ impl<const W: usize> Tree<W> {
         self.below_target.clear();
         self.below_target.resize(self.targets.len(), [0; W]);
         for (i, branch) in self.sources.iter().enumerate() {
-            insert(&mut self.below_target[branch.parent as usize], i);
+            insert(&mut self.below_target[branch.parent], i);
         }
         for (j, branch) in self.targets.iter().enumerate() {
             if j != self.root {
-                insert(&mut self.below_source[branch.parent as usize], j);
+                insert(&mut self.below_source[branch.parent], j);
             }
         }
     }
@@ -268,48 +267,48 @@ impl Cycle {
             let branch = &mut far[at];
             branch.flow -= self.flow;
             branch.below.join(&moved);
-            at = branch.parent as usize;
+            at = branch.parent;
             if rest == 1 {
                 break;
             }
             let branch = &mut near[at];
             branch.flow += self.flow;
             branch.below.join(&moved);
-            at = branch.parent as usize;
+            at = branch.parent;
             rest -= 2;
         }
 
         // The way from the start to the leaving edge turns round: who was above hangs below now.
         let mut at = start;
-        let mut turned = Branch { parent: partner as u32, flow: self.flow, below: moved };
+        let mut turned = Branch { parent: partner, flow: self.flow, below: moved };
         let mut above = loop {
             let old = std::mem::replace(&mut near[at], turned);
             near_way -= 1;
-            let up = old.parent as usize;
+            let up = old.parent;
             if at == self.leaving {
                 break up;
             }
             let old_up = std::mem::replace(
                 &mut far[up],
-                Branch { parent: at as u32, flow: old.flow - self.flow, below: moved.without(&old.below) },
+                Branch { parent: at, flow: old.flow - self.flow, below: moved.without(&old.below) },
             );
             near_way -= 1;
             turned = Branch { parent: old.parent, flow: old_up.flow + self.flow, below: moved.without(&old_up.below) };
-            at = old_up.parent as usize;
+            at = old_up.parent;
         };
 
         while near_way > 0 {
             let branch = &mut far[above];
             branch.flow += self.flow;
             branch.below.leave(&moved);
-            above = branch.parent as usize;
+            above = branch.parent;
             if near_way == 1 {
                 break;
             }
             let branch = &mut near[above];
             branch.flow -= self.flow;
             branch.below.leave(&moved);
-            above = branch.parent as usize;
+            above = branch.parent;
             near_way -= 2;
         }
         moved

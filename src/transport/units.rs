@@ -11,6 +11,12 @@
 //! marginals hold to a few units absolutely (1e-15 for hundreds of points); for everything but a light source feeding a
 //! light target they hold relatively too.
 
+#![expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    reason = "counts of units lie below 2^62, and what their 53 leading bits miss is far below a mass's own rounding"
+)]
+
 use super::problem::{Cloud, Problem};
 
 /// A source with fewer units than this is scaled by its own mass, since rounding moved it noticeably.

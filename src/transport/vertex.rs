@@ -29,10 +29,11 @@ pub(super) fn vertex_below(
     plan: &mut Plan,
 ) {
     let mut left = units.clone();
+    #[expect(clippy::cast_precision_loss, reason = "what is cut off goes with the leftovers")]
     let grains_in_all = units.supplies.iter().sum::<i64>() as f64;
     let mut flows = Vec::new();
     for (source, target, mass) in masses {
-        // A float beyond i64 saturates, and NaN counts as nothing.
+        #[expect(clippy::cast_possible_truncation, reason = "beyond i64 it saturates, NaN counts as nothing")]
         let grains = ((mass * grains_in_all) as i64).clamp(0, left.supplies[source].min(left.demands[target]));
         if grains > 0 {
             left.supplies[source] -= grains;
@@ -129,10 +130,10 @@ impl Forest {
         };
         let mut change = matrix.at(flow.source, flow.target);
         for (step, pair) in way.windows(2).enumerate() {
-            change += if step % 2 == 0 { -cost(pair) } else { cost(pair) };
+            change += if step.is_multiple_of(2) { -cost(pair) } else { cost(pair) };
         }
         let raise = change < 0.0;
-        let falls = |step: usize| (step % 2 == 0) == raise;
+        let falls = |step: usize| step.is_multiple_of(2) == raise;
         let mut turn = if raise { i64::MAX } else { flow.grains };
         for (step, pair) in way.windows(2).enumerate() {
             if falls(step) {

@@ -1,0 +1,8 @@
+//! Accuracy: the profiles that trade time against it.
+//!
+//! Every room owns its settings; a [`Profile`] is those settings together, handed down as they are. No room below asks
+//! what the profile is called.
+
+mod profile;
+
+pub use profile::{Profile, ProfileError};

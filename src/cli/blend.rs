@@ -1,0 +1,77 @@
+//! `carpaint blend`: paints become a `.blend`.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use serde_json::json;
+
+use super::output;
+use super::ingest::ReadingArgs;
+use super::profile::ProfileArgs;
+use super::progress::Progress;
+use crate::workshop::{WorkshopError, blend_paints, open_paint};
+
+/// Find how the flakes of 2 to 5 paints become one another, and keep it as a .blend.
+///
+/// Each INPUT is a measurement, a .paint or a sample (sample:NAME). Weights of a realisation follow their order.
+#[derive(Args, Clone, Debug)]
+pub struct Blend {
+    /// The paints.
+    #[arg(value_name = "INPUT", required = true, num_args = 1..)]
+    inputs: Vec<String>,
+    #[command(flatten)]
+    profile: ProfileArgs,
+    /// File to write.
+    #[arg(long, value_name = "B.blend")]
+    out: PathBuf,
+    /// Write the seconds each stage took.
+    #[arg(long, value_name = "T.json")]
+    timings: Option<PathBuf>,
+}
+
+impl Blend {
+    pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        let options = ReadingArgs::default().options(None, &self.profile)?;
+        let start = Instant::now();
+        let mut paints = Vec::with_capacity(self.inputs.len());
+        for input in &self.inputs {
+            let progress = Progress::new(&format!("reading {input}"));
+            paints.push(open_paint(input, &options, &|share| progress.at(share))?);
+        }
+        let read = start.elapsed();
+        let progress = Progress::new("blending");
+        let made = blend_paints(&paints.iter().collect::<Vec<_>>(), &options.profile, &|share| progress.at(share))?;
+        let blended = start.elapsed();
+        output::replace(&self.out, &made.blend.to_bytes())?;
+        drop(progress);
+        let written = start.elapsed();
+        if let Some(timings) = &self.timings {
+            let seconds = json!({
+                "ingest": read.as_secs_f64(),
+                "blend": (blended - read).as_secs_f64(),
+                "write": (written - blended).as_secs_f64(),
+                "total": written.as_secs_f64(),
+            });
+            output::replace(timings, seconds.to_string().as_bytes())?;
+        }
+        let report = made.blend.report();
+        if json {
+            let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
+            return output::print_json(&json!({ "out": self.out, "paints": names, "correspondence": report, "notes": made.notes }));
+        }
+        for note in &made.notes {
+            eprintln!("note: {note}");
+        }
+        let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
+        eprintln!(
+            "{}: {} · {} slices, {} clusters, mean transport {:.2} Lab",
+            self.out.display(),
+            names.join(" + "),
+            report.slices,
+            report.clusters,
+            report.mean_cost
+        );
+        Ok(())
+    }
+}

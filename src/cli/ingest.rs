@@ -1,0 +1,117 @@
+//! `carpaint ingest`: a measurement becomes a `.paint`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+
+use super::profile::ProfileArgs;
+use super::progress::Progress;
+use super::{output, show};
+use crate::measurement::{Layout, ReadOptions, ThetaHSpacing};
+use crate::workshop::{IngestOptions, Source, WorkshopError, find, ingest};
+
+/// Fit a measurement and keep it as a .paint.
+///
+/// INPUT is a measured-paint package (a .zip or a folder), an RGL .bsdf, an MPI 2005 table or a MERL binary. What it is
+/// is recognised from its contents; --layout overrides that.
+#[derive(Args, Clone, Debug)]
+pub struct Ingest {
+    /// The measurement.
+    #[arg(value_name = "INPUT")]
+    input: String,
+    /// Name of the paint, in place of the measurement's own.
+    #[arg(long, value_name = "N")]
+    name: Option<String>,
+    #[command(flatten)]
+    reading: ReadingArgs,
+    #[command(flatten)]
+    profile: ProfileArgs,
+    /// File to write.
+    #[arg(long, value_name = "P.paint")]
+    out: PathBuf,
+}
+
+/// How a measurement is read.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ReadingArgs {
+    /// What the file is, where it should not be recognised from its contents.
+    #[arg(long, value_enum, value_name = "LAYOUT")]
+    layout: Option<LayoutName>,
+    /// Spacing of theta_h in an MPI 2005 table.
+    #[arg(long, value_enum, value_name = "SPACING")]
+    theta_h: Option<SpacingName>,
+    /// Bytes before the values of an MPI 2005 table, 84 unless given.
+    #[arg(long, value_name = "N")]
+    header_bytes: Option<u64>,
+    /// Give the paint a clear coat of this index of refraction, 1 to 4; otherwise the fit decides.
+    #[arg(long, value_name = "N")]
+    coat_ior: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum LayoutName {
+    #[value(name = "mpi-2005")]
+    Mpi2005,
+    Merl,
+    Rgl,
+    Package,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SpacingName {
+    Linear,
+    Sqrt,
+}
+
+impl ReadingArgs {
+    /// The options these arguments mean, for a profile.
+    pub fn options(&self, name: Option<String>, profile: &ProfileArgs) -> Result<IngestOptions, WorkshopError> {
+        if let Some(ior) = self.coat_ior.filter(|ior| !(1.0..=4.0).contains(ior)) {
+            return Err(WorkshopError::usage("--coat-ior", format!("--coat-ior is {ior}, accepted is 1 to 4")));
+        }
+        let layout = self.layout.map(|layout| match layout {
+            LayoutName::Mpi2005 => Layout::Mpi2005,
+            LayoutName::Merl => Layout::Merl,
+            LayoutName::Rgl => Layout::Rgl,
+            LayoutName::Package => Layout::Package,
+        });
+        let theta_h = self.theta_h.map(|spacing| match spacing {
+            SpacingName::Linear => ThetaHSpacing::Linear,
+            SpacingName::Sqrt => ThetaHSpacing::SquareRoot,
+        });
+        Ok(IngestOptions {
+            name,
+            read: ReadOptions { layout, theta_h, header_bytes: self.header_bytes },
+            coat_ior: self.coat_ior,
+            clusters: profile.clusters,
+            profile: profile.profile()?,
+            ..IngestOptions::default()
+        })
+    }
+}
+
+impl Ingest {
+    pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        let options = self.reading.options(self.name.clone(), &self.profile)?;
+        let progress = Progress::new("ingesting");
+        let path = match find(&self.input)? {
+            Source::Path(path) => path,
+            Source::Sample(sample) => {
+                let hint = format!("a sample is no measurement; 'carpaint samples export {}' writes its .paint", sample.name);
+                return Err(WorkshopError::input(&self.input, hint));
+            }
+        };
+        let paint = ingest(&path, &options, &|share| progress.at(share))?;
+        output::replace(&self.out, &paint.to_bytes())?;
+        drop(progress);
+        if json {
+            return output::print_json(&json!({ "out": self.out, "paint": show::summary(&paint) }));
+        }
+        for warning in &paint.warnings {
+            eprintln!("warning: {warning}");
+        }
+        eprintln!("{}: {}", self.out.display(), show::one_line(&paint));
+        Ok(())
+    }
+}

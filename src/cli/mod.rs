@@ -1,0 +1,122 @@
+//! The command line: one file per command, all of them calling the workshop.
+//!
+//! Scripts call these commands, so they are kept stable: exit codes are 2 for usage, 3 for input, 4 for output and 1 for
+//! a bug; `--json` prints one object on stdout; progress and errors go to stderr; files appear whole or not at all.
+
+mod blend;
+mod evaluate;
+mod ingest;
+mod output;
+mod preview;
+mod profile;
+mod progress;
+mod realise;
+mod samples;
+mod serve;
+mod show;
+mod texels;
+mod weights;
+
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::workshop::{Fault, WorkshopError};
+
+/// Material synthesis for car paints: measured metallic paints in, new, realistic paints out.
+#[derive(Parser, Debug)]
+#[command(name = "carpaint", version, about, propagate_version = true, after_help = EXAMPLES)]
+struct Cli {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// What every command takes.
+#[derive(Args, Clone, Copy, Debug)]
+struct Common {
+    /// Print one JSON object on stdout; progress and errors stay on stderr.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Threads to compute with. Results are the same with any number.
+    #[arg(long, global = true, value_name = "N", env = "RAYON_NUM_THREADS", hide_env = true)]
+    threads: Option<usize>,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    Serve(serve::Serve),
+    Ingest(ingest::Ingest),
+    Show(show::Show),
+    Blend(blend::Blend),
+    Realise(realise::Realise),
+    Preview(preview::Preview),
+    Texels(texels::Texels),
+    Evaluate(evaluate::Evaluate),
+    Samples(samples::Samples),
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  carpaint blend sample:polaris_silber sample:ford_f8 --out two.blend
+  carpaint preview two.blend --weights 0.5,0.5 --out between.png
+  carpaint realise two.blend --weights 0.5,0.5 --out between.zip
+  carpaint serve";
+
+/// Runs the command line of this process.
+#[must_use]
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    match start(cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("carpaint: {error}");
+            ExitCode::from(match error.fault {
+                Fault::Usage => 2,
+                Fault::Input => 3,
+                Fault::Output => 4,
+                Fault::Internal => 1,
+            })
+        }
+    }
+}
+
+fn start(cli: Cli) -> Result<(), WorkshopError> {
+    if cli.common.threads == Some(0) {
+        return Err(WorkshopError::usage("--threads", "--threads is 0, accepted is 1 or more"));
+    }
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(cli.common.threads.unwrap_or(0))
+        .build_global()
+        .map_err(WorkshopError::internal)?;
+    let json = cli.common.json;
+    match cli.command {
+        Command::Serve(command) => command.run(json),
+        Command::Ingest(command) => command.run(json),
+        Command::Show(command) => command.run(json),
+        Command::Blend(command) => command.run(json),
+        Command::Realise(command) => command.run(json),
+        Command::Preview(command) => command.run(json),
+        Command::Texels(command) => command.run(json),
+        Command::Evaluate(command) => command.run(json),
+        Command::Samples(command) => command.run(json),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn negative_weights_need_no_equals_sign() {
+        let cli = Cli::try_parse_from(["carpaint", "realise", "b.blend", "--weights", "-2,3", "--out", "x.zip"]);
+        assert!(cli.is_ok(), "{:?}", cli.err());
+    }
+}

@@ -1,0 +1,110 @@
+//! `carpaint preview`: a picture of a paint.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Instant;
+
+use clap::Args;
+use serde_json::json;
+
+use super::ingest::ReadingArgs;
+use super::output;
+use super::profile::ProfileArgs;
+use super::progress::Progress;
+use super::realise::refuse_weights;
+use super::weights::WeightArgs;
+use crate::workshop::{PictureFormat, PreviewOptions, Thing, WorkshopError, open, preview, read_environment};
+
+/// Draw a paint, a blend at given weights, or a sample.
+#[derive(Args, Clone, Debug)]
+pub struct Preview {
+    /// A .paint, a .blend, a sample or a measurement.
+    #[arg(value_name = "PAINT|BLEND|sample")]
+    input: String,
+    #[command(flatten)]
+    weights: WeightArgs,
+    /// What the paint is on: sphere, capsule or panel.
+    #[arg(long, value_name = "SHAPE", default_value = "sphere")]
+    scene: String,
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", default_value = "512x512")]
+    size: Size,
+    /// Samples per pixel, in place of the profile's.
+    #[arg(long, value_name = "N")]
+    spp: Option<u32>,
+    /// A panorama to light it with, .hdr or .exr, in place of the built-in studio.
+    #[arg(long, value_name = "FILE")]
+    environment: Option<PathBuf>,
+    #[command(flatten)]
+    profile: ProfileArgs,
+    /// Picture to write: .png for a screen, .exr for linear light.
+    #[arg(long, value_name = "F.png|F.exr")]
+    out: PathBuf,
+    /// Write the seconds each stage took.
+    #[arg(long, value_name = "T.json")]
+    timings: Option<PathBuf>,
+}
+
+/// `WxH` in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("'{text}' is no size; accepted is WxH, such as 512x512, 1 to 16384 each");
+        let (width, height) = text.split_once('x').ok_or_else(wrong)?;
+        let side = |s: &str| s.parse().ok().filter(|n| (1..=16384).contains(n)).ok_or_else(wrong);
+        Ok(Self { width: side(width)?, height: side(height)? })
+    }
+}
+
+impl Preview {
+    pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        let options = ReadingArgs::default().options(None, &self.profile)?;
+        let format = PictureFormat::of_path(&self.out)?;
+        let start = Instant::now();
+        let thing = open(&self.input, &options, &|_| ())?;
+        let weights = match &thing {
+            Thing::Paint(_) => refuse_weights(&self.weights).map(|()| None)?,
+            Thing::Blend(blend) => Some(self.weights.for_blend(blend.ingredients().map(|(name, _)| name))?),
+        };
+        let environment = self.environment.as_deref().map(|path| read_environment(path, &options.limits)).transpose()?;
+        let opened = start.elapsed();
+        let wanted = PreviewOptions {
+            scene: self.scene.clone(),
+            size: [self.size.width, self.size.height],
+            samples_per_pixel: self.spp.unwrap_or(options.profile.samples_per_pixel),
+            environment,
+        };
+        let progress = Progress::new("drawing");
+        let made = preview(&thing, weights.as_ref(), &wanted, format, &options.limits, &|share| progress.at(share))?;
+        let drawn = start.elapsed();
+        output::replace(&self.out, &made.bytes)?;
+        drop(progress);
+        if let Some(timings) = &self.timings {
+            let written = start.elapsed();
+            let seconds = json!({
+                "open": opened.as_secs_f64(),
+                "draw": (drawn - opened).as_secs_f64(),
+                "write": (written - drawn).as_secs_f64(),
+                "total": written.as_secs_f64(),
+            });
+            output::replace(timings, seconds.to_string().as_bytes())?;
+        }
+        if json {
+            return output::print_json(&json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report }));
+        }
+        for line in &made.notes {
+            eprintln!("note: {line}");
+        }
+        eprintln!("{}: {} x {}", self.out.display(), self.size.width, self.size.height);
+        Ok(())
+    }
+}

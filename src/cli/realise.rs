@@ -1,0 +1,59 @@
+//! `carpaint realise`: a blend at given weights becomes a file that others use.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::ingest::ReadingArgs;
+use super::output;
+use super::profile::ProfileArgs;
+use super::weights::WeightArgs;
+use crate::workshop::{Format, Thing, WorkshopError, open, realise};
+
+/// Take a realisation of a blend: a texture bundle, a GLB, a material.json, or a .paint.
+///
+/// A paint or a sample is exported as it is.
+#[derive(Args, Clone, Debug)]
+pub struct Realise {
+    /// A .blend; or a .paint, a sample or a measurement, which need no weights.
+    #[arg(value_name = "BLEND")]
+    input: String,
+    #[command(flatten)]
+    weights: WeightArgs,
+    #[command(flatten)]
+    profile: ProfileArgs,
+    /// File to write; its ending says what: .zip, .glb, .json or .paint.
+    #[arg(long, value_name = "F.zip|F.glb|F.json|F.paint")]
+    out: PathBuf,
+}
+
+impl Realise {
+    pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        let options = ReadingArgs::default().options(None, &self.profile)?;
+        let format = Format::of_path(&self.out)?;
+        let thing = open(&self.input, &options, &|_| ())?;
+        let weights = match &thing {
+            Thing::Paint(_) => refuse_weights(&self.weights).map(|()| None)?,
+            Thing::Blend(blend) => Some(self.weights.for_blend(blend.ingredients().map(|(name, _)| name))?),
+        };
+        let made = realise(&thing, weights.as_ref(), format, &options.profile)?;
+        output::replace(&self.out, &made.bytes)?;
+        if json {
+            return output::print_json(&json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report }));
+        }
+        for line in &made.notes {
+            eprintln!("note: {line}");
+        }
+        eprintln!("{}: {} bytes", self.out.display(), made.bytes.len());
+        Ok(())
+    }
+}
+
+/// One paint takes no weights: asking for some is a mistake worth telling.
+pub fn refuse_weights(weights: &WeightArgs) -> Result<(), WorkshopError> {
+    if weights.is_empty() {
+        return Ok(());
+    }
+    Err(WorkshopError::usage("--weights", "this is one paint, weights are for a .blend: leave them out"))
+}

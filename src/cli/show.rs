@@ -1,0 +1,110 @@
+//! `carpaint show`: everything known about a paint or a blend.
+
+use clap::Args;
+use serde_json::Value;
+
+use super::ingest::ReadingArgs;
+use super::output;
+use super::profile::ProfileArgs;
+use crate::paint::PaintFile;
+use crate::workshop::{Thing, WorkshopError, describe_blend, describe_paint, open};
+
+/// Show a paint or a blend: parameters, residuals beside their floor, energy, grain, lifetime, warnings.
+#[derive(Args, Clone, Debug)]
+pub struct Show {
+    /// A .paint, a .blend, a sample or a measurement.
+    #[arg(value_name = "PAINT|BLEND|sample")]
+    input: String,
+    #[command(flatten)]
+    profile: ProfileArgs,
+}
+
+impl Show {
+    pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        let options = ReadingArgs::default().options(None, &self.profile)?;
+        let about = match open(&self.input, &options, &|_| ())? {
+            Thing::Paint(paint) => describe_paint(&paint),
+            Thing::Blend(blend) => describe_blend(&blend),
+        };
+        if json {
+            return output::print_json(&about);
+        }
+        print_tree(&about, 0);
+        Ok(())
+    }
+}
+
+/// What `ingest --json` tells of the new paint.
+pub fn summary(paint: &PaintFile) -> Value {
+    describe_paint(paint)
+}
+
+/// One line for people.
+pub fn one_line(paint: &PaintFile) -> String {
+    let mut parts = vec![paint.name.clone()];
+    if let Some(coat) = paint.paint.coat {
+        parts.push(format!("coat of ior {:.3}", coat.ior));
+    }
+    if let Some(flakes) = &paint.paint.flakes {
+        let t = &flakes.texture;
+        parts.push(format!(
+            "{} slices of up to {} clusters, grain {:.0} µm, lifetime {:.1}°",
+            flakes.slices(),
+            flakes.widest_slice(),
+            t.grain_um,
+            t.lifetime_deg[0]
+        ));
+    }
+    if let Some(r) = &paint.residuals {
+        parts.push(format!("luminance error {:.1} % (floor {:.1} %)", 100.0 * r.all.median, 100.0 * r.all.floor_median));
+    }
+    parts.join(" · ")
+}
+
+/// Prints nested values as an indented list; short lists of numbers stay on one line.
+fn print_tree(value: &Value, depth: usize) {
+    let pad = "  ".repeat(depth);
+    match value {
+        Value::Object(map) => {
+            for (key, value) in map {
+                match inline(value) {
+                    Some(text) => println!("{pad}{key}: {text}"),
+                    None => {
+                        println!("{pad}{key}:");
+                        print_tree(value, depth + 1);
+                    }
+                }
+            }
+        }
+        Value::Array(list) => {
+            for value in list {
+                match inline(value) {
+                    Some(text) => println!("{pad}- {text}"),
+                    None => {
+                        println!("{pad}-");
+                        print_tree(value, depth + 1);
+                    }
+                }
+            }
+        }
+        other => println!("{pad}{}", inline(other).unwrap_or_default()),
+    }
+}
+
+fn inline(value: &Value) -> Option<String> {
+    match value {
+        Value::Null => Some("none".to_owned()),
+        Value::Bool(yes) => Some(if *yes { "yes" } else { "no" }.to_owned()),
+        Value::Number(n) => Some(n.as_f64().filter(|_| !n.is_u64()).map_or_else(|| n.to_string(), |v| format!("{v:.5}"))),
+        Value::String(text) => Some(text.clone()),
+        Value::Array(list) if list.is_empty() => Some("none".to_owned()),
+        Value::Array(list) if list.iter().all(Value::is_number) => {
+            Some(list.iter().filter_map(inline).collect::<Vec<_>>().join(", "))
+        }
+        Value::Object(map) if map.is_empty() => Some("none".to_owned()),
+        Value::Object(map) if map.len() <= 4 && map.values().all(|v| v.is_number() || v.is_string()) => {
+            Some(map.iter().filter_map(|(k, v)| inline(v).map(|v| format!("{k} {v}"))).collect::<Vec<_>>().join(" · "))
+        }
+        _ => None,
+    }
+}

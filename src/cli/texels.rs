@@ -1,0 +1,66 @@
+//! `carpaint texels`: the flakes at one angle pair, as the random texture draws them.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::ingest::ReadingArgs;
+use super::output;
+use super::preview::Size;
+use super::profile::ProfileArgs;
+use super::realise::refuse_weights;
+use super::weights::WeightArgs;
+use crate::workshop::{Thing, WorkshopError, open, texels};
+
+/// Write the flakes at one angle pair as an EXR: 1/sr, linear sRGB, one pixel a texel.
+#[derive(Args, Clone, Debug)]
+pub struct Texels {
+    /// A .paint, a .blend, a sample or a measurement.
+    #[arg(value_name = "PAINT|BLEND")]
+    input: String,
+    #[command(flatten)]
+    weights: WeightArgs,
+    /// Angle of the half vector from the normal, degrees inside the coat, 0 to 90.
+    #[arg(long, value_name = "DEG")]
+    theta_h: f64,
+    /// Angle between half vector and light, degrees inside the coat, 0 to 90.
+    #[arg(long, value_name = "DEG")]
+    theta_d: f64,
+    /// Width and height in texels.
+    #[arg(long, value_name = "WxH", default_value = "256x256")]
+    size: Size,
+    /// Which random texture.
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    seed: u32,
+    #[command(flatten)]
+    profile: ProfileArgs,
+    /// Picture to write.
+    #[arg(long, value_name = "F.exr")]
+    out: PathBuf,
+}
+
+impl Texels {
+    pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        for (name, angle) in [("--theta-h", self.theta_h), ("--theta-d", self.theta_d)] {
+            if !(0.0..=90.0).contains(&angle) {
+                return Err(WorkshopError::usage(name, format!("{name} is {angle}, accepted is 0 to 90 degrees")));
+            }
+        }
+        let options = ReadingArgs::default().options(None, &self.profile)?;
+        let thing = open(&self.input, &options, &|_| ())?;
+        if matches!(thing, Thing::Paint(_)) {
+            refuse_weights(&self.weights)?;
+        }
+        let realised =
+            thing.realise(|blend| self.weights.for_blend(blend.ingredients().map(|(name, _)| name)).map(Some))?;
+        let (angles, size) = ([self.theta_h, self.theta_d], [self.size.width, self.size.height]);
+        let bytes = texels(&realised.paint, angles, size, self.seed, &options.limits)?;
+        output::replace(&self.out, &bytes)?;
+        if json {
+            return output::print_json(&json!({ "out": self.out, "bytes": bytes.len() }));
+        }
+        eprintln!("{}: {} x {} texels", self.out.display(), self.size.width, self.size.height);
+        Ok(())
+    }
+}

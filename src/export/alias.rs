@@ -1,0 +1,110 @@
+//! Alias tables: a draw from n clusters with one random number, one comparison and no loss.
+//!
+//! Take slot `k = floor(u n)`; with `u n − k` below the slot's threshold the cluster is `k`, otherwise the slot's alias.
+//! Source: M. D. Vose, "A linear algorithm for generating random variates with a given distribution", IEEE TSE 17
+//! (1991). A draw through the table has the slice's histogram but not its order: a random number kept over
+//! neighbouring slices is not one flake any more. Where flakes must fade instead of flicker, draw by cumulative
+//! probability.
+
+/// One slot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AliasEntry {
+    /// Share of the slot that is its own cluster, `0..=1`.
+    pub threshold: f64,
+    /// Cluster of the rest, counted within the slice.
+    pub alias: u32,
+}
+
+/// The table of one slice; `probability` sums to 1.
+///
+/// # Panics
+///
+/// When there are more than 2^32 clusters.
+#[must_use]
+pub fn alias_table(probability: &[f64]) -> Vec<AliasEntry> {
+    let mut table = Vec::with_capacity(probability.len());
+    Builder::default().build(probability, &mut table);
+    table
+}
+
+/// Work lists that are kept between slices.
+#[derive(Debug, Default)]
+pub(super) struct Builder {
+    small: Vec<u32>,
+    large: Vec<u32>,
+    scaled: Vec<f64>,
+}
+
+impl Builder {
+    /// Appends the table of a slice.
+    pub(super) fn build(&mut self, probability: &[f64], table: &mut Vec<AliasEntry>) {
+        let first = table.len();
+        #[allow(clippy::cast_precision_loss)] // a count of clusters
+        let n = probability.len() as f64;
+        self.small.clear();
+        self.large.clear();
+        self.scaled.clear();
+        self.scaled.extend(probability.iter().map(|p| p * n));
+        for (k, &share) in (0_u32..).zip(&self.scaled) {
+            table.push(AliasEntry { threshold: 1.0, alias: k });
+            if share < 1.0 { self.small.push(k) } else { self.large.push(k) }
+        }
+        while let (Some(&low), Some(&high)) = (self.small.last(), self.large.last()) {
+            self.small.pop();
+            let share = self.scaled[low as usize];
+            table[first + low as usize] = AliasEntry { threshold: share.max(0.0), alias: high };
+            let left = (self.scaled[high as usize] + share) - 1.0;
+            self.scaled[high as usize] = left;
+            if left < 1.0 {
+                self.large.pop();
+                self.small.push(high);
+            }
+        }
+        // What is left on either list is 1 but for rounding, and keeps its slot whole.
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Probability that the table gives each cluster.
+    fn drawn(table: &[AliasEntry]) -> Vec<f64> {
+        let mut out = vec![0.0; table.len()];
+        #[allow(clippy::cast_precision_loss)]
+        let slot = 1.0 / table.len() as f64;
+        for (k, entry) in table.iter().enumerate() {
+            out[k] += slot * entry.threshold;
+            out[entry.alias as usize] += slot * (1.0 - entry.threshold);
+        }
+        out
+    }
+
+    #[test]
+    fn a_single_cluster_is_always_drawn() {
+        assert_eq!(alias_table(&[1.0]), [AliasEntry { threshold: 1.0, alias: 0 }]);
+    }
+
+    #[test]
+    fn a_cluster_of_probability_zero_is_never_drawn() {
+        let table = alias_table(&[0.0, 0.25, 0.75]);
+        assert_eq!(table[0].threshold, 0.0);
+        assert!(table.iter().skip(1).all(|entry| entry.alias != 0 || entry.threshold == 1.0));
+    }
+
+    proptest! {
+        #[test]
+        fn every_cluster_is_drawn_as_often_as_it_is_probable(
+            weights in prop::collection::vec(prop_oneof![Just(0.0), 1e-12..1.0_f64, 0.9..1.0_f64], 1..150),
+        ) {
+            let sum: f64 = weights.iter().sum();
+            prop_assume!(sum > 0.0);
+            let p: Vec<f64> = weights.iter().map(|w| w / sum).collect();
+            for (want, got) in p.iter().zip(drawn(&alias_table(&p))) {
+                // Each slot's share passes through at most n subtractions of numbers below n.
+                prop_assert!((want - got).abs() <= 1e-13 * p.len() as f64, "{want} {got}");
+            }
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Numbers on their way into a texture: finite, within the range of the texture's type, and what was bent is told.
+
+use half::f16;
+use half::slice::HalfFloatSliceExt;
+use serde::Serialize;
+
+use super::ExportError;
+
+/// Largest magnitude that a half holds.
+const HALF_MAX: f32 = 65504.0;
+
+/// A clamp that bit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Clamped {
+    /// The texture.
+    pub what: &'static str,
+    /// How many numbers were outside the range.
+    pub count: usize,
+    /// The farthest of them.
+    pub farthest: f64,
+    /// The magnitude they were held to.
+    pub limit: f64,
+}
+
+/// Refuses numbers that are not finite.
+pub(super) fn finite(what: &'static str, values: &[f32]) -> Result<(), ExportError> {
+    values.iter().position(|v| !v.is_finite()).map_or(Ok(()), |index| Err(ExportError::NotFinite { what, index }))
+}
+
+/// Halves of finite numbers, clamped to ±65504. Adds to `clamped` when the clamp bit.
+pub(super) fn halves(
+    what: &'static str,
+    values: &mut [f32],
+    clamped: &mut Vec<Clamped>,
+) -> Result<Vec<f16>, ExportError> {
+    finite(what, values)?;
+    let (mut count, mut farthest) = (0, 0.0_f32);
+    for value in values.iter_mut().filter(|v| v.abs() > HALF_MAX) {
+        count += 1;
+        if value.abs() > farthest.abs() {
+            farthest = *value;
+        }
+        *value = value.clamp(-HALF_MAX, HALF_MAX);
+    }
+    if count > 0 {
+        match clamped.iter_mut().find(|c| c.what == what) {
+            Some(known) => {
+                known.count += count;
+                if f64::from(farthest.abs()) > known.farthest.abs() {
+                    known.farthest = f64::from(farthest);
+                }
+            }
+            None => {
+                let (farthest, limit) = (f64::from(farthest), f64::from(HALF_MAX));
+                clamped.push(Clamped { what, count, farthest, limit });
+            }
+        }
+    }
+    let mut out = vec![f16::ZERO; values.len()];
+    out.convert_from_f32_slice(values);
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_too_large_for_a_half_is_held_and_told() {
+        let mut clamped = Vec::new();
+        let mut values = [1.0, 70000.0, -1e9, 65504.0];
+        let out = halves("means", &mut values, &mut clamped).expect("finite");
+        assert_eq!(out.iter().map(|h| h.to_f32()).collect::<Vec<_>>(), [1.0, 65504.0, -65504.0, 65504.0]);
+        assert_eq!(clamped, [Clamped { what: "means", count: 2, farthest: -1e9, limit: 65504.0 }]);
+    }
+
+    #[test]
+    fn what_is_not_finite_is_refused_by_place() {
+        let error = halves("means", &mut [0.0, f32::NAN], &mut Vec::new()).expect_err("refused");
+        assert!(matches!(error, ExportError::NotFinite { what: "means", index: 1 }));
+    }
+
+    #[test]
+    fn no_finite_number_becomes_an_infinite_half() {
+        // Between 65504 and 65520 a half rounds down, above it would be infinite.
+        let mut clamped = Vec::new();
+        for value in [65504.1_f32, 65519.9, 65520.0, f32::MAX] {
+            assert_eq!(halves("x", &mut [value], &mut clamped).expect("finite"), [f16::MAX]);
+        }
+        assert_eq!(clamped[0].count, 4);
+    }
+}

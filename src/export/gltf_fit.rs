@@ -1,0 +1,405 @@
+//! A glTF material for a paint, fitted to how the paint looks, and how far it stays away.
+//!
+//! Minimised are color differences between [`GltfMaterial`] and [`Reflectance`] at the six instrument geometries, and
+//! with a tenth of the weight at six more pairs. A glTF material has one lobe under one coat: the paint's lobes and the
+//! mean of its flakes become the specular lobe of a dielectric whose F0 is free (`KHR_materials_specular`), its flop
+//! the diffuse base. A paint's own coat becomes the clear coat; without one its narrowest lobe does, when it is as narrow
+//! as lacquer, since the geometries do not see a highlight. Where the hue travels and one color cannot follow it,
+//! iridescence is tried, and kept when it brings the material nearer.
+//!
+//! Levenberg-Marquardt on differences in the metric of CIEDE2000 at the paint's colors, from fixed starts: the same
+//! paint gives the same material. The reported loss is CIEDE2000 itself.
+
+use serde::Serialize;
+
+use super::gltf_brdf::{Cosines, GltfMaterial, dielectric_f0};
+use super::gltf_search::{Problem, minimise};
+use crate::color::{Lab, LinearRgb, ciede2000};
+use crate::paint::{ASPECULAR_DEG, Chi, Direction, Reflectance, instrument_pairs};
+
+/// Share of the merit by which iridescence must improve it.
+const WORTH_A_FILM: f64 = 0.7;
+/// Sum of squared differences below which no film is tried.
+const GOOD_ENOUGH: f64 = 6.0;
+/// Hue, in degrees, that must change between the geometries before a film is tried.
+const HUE_TRAVEL_DEG: f64 = 20.0;
+/// Widest lobe that looks like lacquer: a highlight with a visible rim.
+const LACQUER_ALPHA: f64 = 0.1;
+/// Weight of the pairs beside the instrument's.
+const BESIDE: f64 = 0.1;
+
+/// How far a GLB's material is from its paint, textures averaged.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LossReport {
+    /// Aspecular angles of the geometries, degrees; light at 45°.
+    pub aspecular_deg: [f64; 6],
+    /// CIEDE2000 between material and paint at each.
+    pub delta_e2000: [f64; 6],
+    /// The same with the material averaged over the normals of its texture, as a close view averages.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delta_e2000_over_normals: Option<[f64; 6]>,
+    /// Median of `delta_e2000`.
+    pub median: f64,
+    /// Largest of `delta_e2000`.
+    pub worst: f64,
+    /// CIELAB of the paint, D65, 2° observer.
+    pub paint_lab: [[f64; 3]; 6],
+    /// CIELAB of the material.
+    pub material_lab: [[f64; 3]; 6],
+}
+
+/// A pair of directions and what the paint shows there.
+struct Target {
+    cosines: Cosines,
+    color: LinearRgb,
+    lab: Lab,
+    metric: Metric,
+    weight: f64,
+}
+
+/// CIEDE2000 near one color: differences of lightness, chroma and hue over their tolerances.
+struct Metric {
+    chroma_axis: [f64; 2],
+    tolerance: [f64; 3],
+}
+
+impl Metric {
+    fn at(lab: Lab) -> Self {
+        let chroma = lab.a.hypot(lab.b);
+        let chroma_axis = if chroma > 1e-9 { [lab.a / chroma, lab.b / chroma] } else { [1.0, 0.0] };
+        let l50 = (lab.l - 50.0).powi(2);
+        let tolerance = [1.0 + 0.015 * l50 / (20.0 + l50).sqrt(), 1.0 + 0.045 * chroma, 1.0 + 0.015 * chroma];
+        Self { chroma_axis, tolerance }
+    }
+
+    fn difference(&self, from: Lab, to: Lab) -> [f64; 3] {
+        let [u, v] = self.chroma_axis;
+        let (da, db) = (to.a - from.a, to.b - from.b);
+        let parts = [to.l - from.l, u * da + v * db, u * db - v * da];
+        std::array::from_fn(|k| parts[k] / self.tolerance[k])
+    }
+}
+
+fn target(reflectance: &Reflectance<'_>, (wi, wo): (Direction, Direction), weight: f64) -> Option<Target> {
+    let color = reflectance.evaluate(wi, wo, Chi::Table);
+    let lab = reflected(color);
+    Cosines::of(wi, wo).map(|cosines| Target { cosines, color, lab, metric: Metric::at(lab), weight })
+}
+
+/// CIELAB of a BRDF value under the instrument's light.
+fn reflected(f: LinearRgb) -> Lab {
+    Lab::from_rgb(f.map(|v| std::f64::consts::PI * v))
+}
+
+/// Pairs beside the instrument's: light at 15° and 65°, so that the lobe holds where the instrument does not look.
+fn pairs_beside() -> impl Iterator<Item = (Direction, Direction)> {
+    [15.0_f64, 65.0].into_iter().flat_map(|light| {
+        [15.0, 35.0, 60.0].map(|aspecular| {
+            let (light, view) = (light.to_radians(), (light - aspecular).to_radians());
+            ([-light.sin(), 0.0, light.cos()], [view.sin(), 0.0, view.cos()])
+        })
+    })
+}
+
+/// Whether the instrument sees hues that no single color explains.
+fn hue_travels(targets: &[Target]) -> bool {
+    let colors = targets.iter().filter(|t| t.weight == 1.0).map(|t| t.lab);
+    let colored: Vec<f64> =
+        colors.filter(|lab| lab.a.hypot(lab.b) > 10.0).map(|lab| lab.b.atan2(lab.a).to_degrees()).collect();
+    colored.iter().any(|x| colored.iter().any(|y| ((x - y + 540.0).rem_euclid(360.0) - 180.0).abs() > HUE_TRAVEL_DEG))
+}
+
+/// The material, with the loss that it has.
+pub(super) fn fit(reflectance: &Reflectance<'_>) -> (GltfMaterial, LossReport) {
+    let targets: Vec<Target> = instrument_pairs()
+        .into_iter()
+        .map(|pair| (pair, 1.0))
+        .chain(pairs_beside().map(|pair| (pair, BESIDE)))
+        .filter_map(|(pair, weight)| target(reflectance, pair, weight))
+        .collect();
+    let mut best = fit_plain(reflectance, &targets);
+    if best.merit > GOOD_ENOUGH && hue_travels(&targets) {
+        let film = fit_film(&best, &targets);
+        if film.merit < WORTH_A_FILM * best.merit {
+            best = film;
+        }
+    }
+    (best.material, loss(&best.material, reflectance, None))
+}
+
+/// CIEDE2000 of a material against a paint; `normals` are those of a texture to average over.
+pub(super) fn loss(
+    material: &GltfMaterial,
+    reflectance: &Reflectance<'_>,
+    normals: Option<&[Direction]>,
+) -> LossReport {
+    let labs = |pair: (Direction, Direction)| {
+        let paint = reflected(reflectance.evaluate(pair.0, pair.1, Chi::Table));
+        (paint, reflected(material.evaluate(pair.0, pair.1)))
+    };
+    let pairs = instrument_pairs();
+    let both = pairs.map(labs);
+    let delta_e2000 = both.map(|(paint, material)| ciede2000(paint, material));
+    let delta_e2000_over_normals = normals.map(|normals| {
+        std::array::from_fn(|k| ciede2000(both[k].0, reflected(over_normals(material, pairs[k], normals))))
+    });
+    let mut sorted = delta_e2000;
+    sorted.sort_by(f64::total_cmp);
+    LossReport {
+        aspecular_deg: ASPECULAR_DEG,
+        delta_e2000,
+        delta_e2000_over_normals,
+        median: f64::midpoint(sorted[2], sorted[3]),
+        worst: sorted[5],
+        paint_lab: both.map(|(paint, _)| paint.to_array()),
+        material_lab: both.map(|(_, material)| material.to_array()),
+    }
+}
+
+/// Mean of a material over tilted normals, seen as one surface.
+fn over_normals(material: &GltfMaterial, (wi, wo): (Direction, Direction), normals: &[Direction]) -> LinearRgb {
+    let mut sum = [0.0; 3];
+    for normal in normals {
+        let [li, lo] = [wi, wo].map(|w| in_frame(*normal, w));
+        let f = material.evaluate(li, lo);
+        // A viewer multiplies by the cosine against the tilted normal, the instrument divides by the flat one.
+        for k in 0..3 {
+            sum[k] += f[k] * li[2].max(0.0) / wi[2];
+        }
+    }
+    #[allow(clippy::cast_precision_loss)] // a handful
+    sum.map(|v| v / normals.len().max(1) as f64)
+}
+
+/// A direction in the frame of a normal near the pole: the shortest rotation that takes the normal to (0, 0, 1).
+fn in_frame(n: Direction, w: Direction) -> Direction {
+    let dot = n[0] * w[0] + n[1] * w[1] + n[2] * w[2];
+    let across = (w[2] + dot) / (1.0 + n[2]);
+    [w[0] - across * n[0], w[1] - across * n[1], dot]
+}
+
+/// A candidate.
+struct Candidate {
+    material: GltfMaterial,
+    merit: f64,
+}
+
+struct Fitting<'a> {
+    targets: &'a [Target],
+    layout: Layout,
+    /// What is not free.
+    fixed: GltfMaterial,
+    bounds: Vec<(f64, f64)>,
+}
+
+/// Which numbers of the material are free beside diffuse, F0 and the lobe's α.
+#[derive(Clone, Copy, PartialEq)]
+enum Layout {
+    /// None: the clear coat is the paint's own.
+    Lobe,
+    /// The clear coat's α: its weight is the lacquer lobe's.
+    Lacquer,
+    /// The clear coat's weight and α: a second lobe.
+    SecondLobe,
+    /// The film's strength, index and thickness.
+    Film,
+}
+
+impl Problem for Fitting<'_> {
+    fn residuals(&self, x: &[f64], out: &mut Vec<f64>) {
+        let material = self.material(x);
+        out.clear();
+        for t in self.targets {
+            let difference = t.metric.difference(t.lab, reflected(material.at(&t.cosines)));
+            out.extend(difference.map(|d| d * t.weight.sqrt()));
+        }
+    }
+
+    fn bounds(&self) -> &[(f64, f64)] {
+        &self.bounds
+    }
+}
+
+impl<'a> Fitting<'a> {
+    fn new(targets: &'a [Target], layout: Layout, fixed: GltfMaterial) -> Self {
+        let mut bounds = vec![(0.0, 1.0); 6];
+        let lacquer = fixed.clearcoat_roughness.powi(2);
+        match layout {
+            Layout::Lobe => bounds.push((0.02, 1.0)),
+            Layout::Lacquer => bounds.extend([(2.0 * lacquer, 1.0), (0.5 * lacquer, 1.01 * lacquer)]),
+            Layout::SecondLobe => bounds.extend([(0.02, 1.0), (0.0, 1.0), (0.02, 0.8)]),
+            Layout::Film => bounds.extend([(0.02, 1.0), (0.0, 1.0), (1.1, 3.0), (100.0, 1200.0)]),
+        }
+        Self { targets, layout, fixed, bounds }
+    }
+
+    fn material(&self, x: &[f64]) -> GltfMaterial {
+        let f0 = dielectric_f0(1.5, [1.0; 3])[0];
+        let mut material = GltfMaterial {
+            base_color: [x[0], x[1], x[2]],
+            specular_color: [x[3] / f0, x[4] / f0, x[5] / f0],
+            roughness: x[6].sqrt(),
+            ..self.fixed
+        };
+        match self.layout {
+            Layout::Lobe => {}
+            Layout::Lacquer => material.clearcoat_roughness = x[7].sqrt(),
+            Layout::SecondLobe => (material.clearcoat, material.clearcoat_roughness) = (x[7], x[8].sqrt()),
+            Layout::Film => {
+                (material.iridescence, material.iridescence_ior, material.iridescence_thickness_nm) =
+                    (x[7], x[8], x[9]);
+            }
+        }
+        material
+    }
+}
+
+/// What the paint itself says about the clear coat, and what is left to find.
+fn clear_coat(reflectance: &Reflectance<'_>) -> (Layout, GltfMaterial) {
+    let paint = reflectance.paint();
+    let with = |clearcoat: f64, alpha: f64| GltfMaterial {
+        clearcoat: clearcoat.clamp(0.0, 1.0),
+        clearcoat_roughness: alpha.clamp(0.0, 1.0).sqrt(),
+        ..GltfMaterial::default()
+    };
+    if let Some(coat) = paint.coat {
+        let alpha = if coat.is_mirror() { 0.0 } else { coat.roughness };
+        return (Layout::Lobe, with(crate::paint::fresnel(1.0, coat.ior) / 0.04, alpha));
+    }
+    let lobes = paint.lobes.iter().filter(|lobe| !lobe.is_absent() && lobe.alpha < LACQUER_ALPHA);
+    lobes.min_by(|a, b| a.alpha.total_cmp(&b.alpha)).map_or((Layout::SecondLobe, GltfMaterial::default()), |lobe| {
+        // At the normal a lobe reflects 4 s F0, the clear coat 0.04 of its factor.
+        let albedo = 4.0 * lobe.f0 * crate::color::luminance(lobe.weight);
+        (Layout::Lacquer, with(albedo / 0.04, lobe.alpha))
+    })
+}
+
+/// Starts of the lobe's α.
+const ALPHAS: [f64; 5] = [0.08, 0.15, 0.25, 0.4, 0.65];
+
+fn fit_plain(reflectance: &Reflectance<'_>, targets: &[Target]) -> Candidate {
+    let (layout, fixed) = clear_coat(reflectance);
+    let problem = Fitting::new(targets, layout, fixed);
+    let starts = ALPHAS.iter().map(|&alpha| {
+        let rest = match layout {
+            Layout::Lacquer => vec![0.7 * fixed.clearcoat_roughness.powi(2)],
+            Layout::SecondLobe => vec![0.2, 0.5 * alpha],
+            Layout::Lobe | Layout::Film => vec![],
+        };
+        split(targets, alpha).into_iter().chain([alpha]).chain(rest).collect()
+    });
+    best_of(&problem, starts.collect())
+}
+
+/// Diffuse and F0 of every channel for a lobe of this α: the least relative squares, neither negative.
+fn split(targets: &[Target], alpha: f64) -> [f64; 6] {
+    let mut out = [0.0; 6];
+    for k in 0..3 {
+        let (mut dd, mut ds, mut ss, mut df, mut sf) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for t in targets {
+            let (d, s) = (std::f64::consts::FRAC_1_PI, super::gltf_brdf::specular(alpha, &t.cosines));
+            let w = t.weight / (t.color[k].abs() + 1e-3).powf(4.0 / 3.0);
+            dd += w * d * d;
+            ds += w * d * s;
+            ss += w * s * s;
+            df += w * d * t.color[k];
+            sf += w * s * t.color[k];
+        }
+        let determinant = dd * ss - ds * ds;
+        let (mut diffuse, mut f0) = ((df * ss - sf * ds) / determinant, (sf * dd - df * ds) / determinant);
+        if !(f0.is_finite() && f0 > 0.0) {
+            (diffuse, f0) = (df / dd, 1e-4);
+        }
+        if !(diffuse.is_finite() && diffuse > 0.0) {
+            (diffuse, f0) = (1e-4, sf / ss);
+        }
+        out[k] = diffuse.clamp(1e-5, 0.98);
+        out[3 + k] = f0.clamp(1e-4, 0.95);
+    }
+    out
+}
+
+/// Every start followed a little, the two best of them to their end.
+fn best_of(problem: &Fitting<'_>, starts: Vec<Vec<f64>>) -> Candidate {
+    let mut tried: Vec<(f64, Vec<f64>)> = starts.into_iter().map(|start| minimise(problem, start, 6)).collect();
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    tried.truncate(2);
+    let finished = tried.into_iter().map(|(_, x)| minimise(problem, x, 40));
+    let best = finished.min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or(Candidate { material: problem.fixed, merit: f64::INFINITY }, |(merit, x)| Candidate {
+        material: problem.material(&x),
+        merit,
+    })
+}
+
+/// Thicknesses of the film to start from, nanometres: one to three orders of visible light.
+const THICKNESSES: [f64; 6] = [150.0, 250.0, 350.0, 450.0, 600.0, 800.0];
+
+fn fit_film(plain: &Candidate, targets: &[Target]) -> Candidate {
+    let m = plain.material;
+    let f0 = dielectric_f0(m.ior, m.specular_color);
+    let problem = Fitting::new(targets, Layout::Film, m);
+    let keep = |v: f64| v.clamp(1e-4, 0.95);
+    let starts = THICKNESSES.iter().flat_map(|&thickness| {
+        [1.4, 2.0].map(|ior| {
+            let colors = m.base_color.into_iter().chain(f0).map(keep);
+            colors.chain([m.roughness.powi(2), 0.4, ior, thickness]).collect()
+        })
+    });
+    best_of(&problem, starts.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::made_up::metallic;
+    use crate::paint::{CarPaint, ColorTable, Lobe};
+
+    #[test]
+    fn what_gltf_can_say_it_says() {
+        // A Lambertian base under a coat is a glTF material but for the coat's transmission.
+        let paint = CarPaint {
+            coat: None,
+            diffuse: [0.3, 0.1, 0.05],
+            lobes: vec![],
+            color_table: ColorTable::white(),
+            flakes: None,
+        };
+        let (_, loss) = fit(&Reflectance::new(&paint));
+        assert!(loss.worst < 1.0, "{loss:?}");
+    }
+
+    #[test]
+    fn a_metallic_is_met_within_a_just_visible_difference() {
+        let paint = metallic(8, 6, 20);
+        let (material, loss) = fit(&Reflectance::new(&paint));
+        assert!(loss.median < 3.0, "{loss:?} {material:?}");
+    }
+
+    #[test]
+    fn the_eight_published_paints_are_met() {
+        let fits: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string("/work/shared/data/mpi_2005_fits.json").unwrap()).unwrap();
+        for (name, p) in fits["paints"].as_object().unwrap() {
+            let v = |k: usize| -> [f64; 3] { std::array::from_fn(|c| p[k][c].as_f64().unwrap()) };
+            let lobes = (0..3).map(|k| Lobe { weight: v(1 + k), alpha: v(5)[k], f0: v(4)[k] }).collect();
+            let paint = CarPaint { coat: None, diffuse: v(0), lobes, color_table: ColorTable::white(), flakes: None };
+            let r = Reflectance::new(&paint);
+            let t = std::time::Instant::now();
+            let (m, loss) = fit(&r);
+            println!(
+                "{name:14} median {:.2} worst {:.2} {:?} {:.1} ms | a {:.3} cc {:.2} {:.3} film {:.2} {:.2} {:.0}",
+                loss.median,
+                loss.worst,
+                loss.delta_e2000.map(|d| (d * 10.0).round() / 10.0),
+                t.elapsed().as_secs_f64() * 1e3,
+                m.roughness.powi(2),
+                m.clearcoat,
+                m.clearcoat_roughness.powi(2),
+                m.iridescence,
+                m.iridescence_ior,
+                m.iridescence_thickness_nm
+            );
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! Fewer clusters: what a blended paint needs before it is blended again.
+//!
+//! A realisation carries the sum of its paints' clusters per slice. Pairs are merged, each time the two whose merging
+//! moves the least mass the least far (Ward's criterion, `p q / (p + q) · |c − d|²` in Lab), until `n` are left. A merged
+//! box keeps the members' mean and variance per axis, then is shifted until its mean in linear light is its members'.
+
+use rayon::prelude::*;
+
+use crate::color::LinearRgb;
+use crate::paint::{Flakes, Slice, center_of_mean, mean_color};
+
+/// A cluster on its way: mass, moments in Lab, mean in linear light.
+#[derive(Clone, Copy, Debug)]
+struct Heap {
+    mass: f64,
+    center: [f64; 3],
+    variance: [f64; 3],
+    linear: LinearRgb,
+    /// The box itself while nothing was merged into it.
+    own: Option<([f32; 3], [f32; 3])>,
+}
+
+/// The same flakes with at most `most` clusters in each slice. Slices that have no more stay as they are.
+#[must_use]
+pub fn reduce_clusters(flakes: &Flakes, most: usize) -> Flakes {
+    let slices: Vec<Vec<(f64, [f32; 3], [f32; 3])>> =
+        (0..flakes.slices()).into_par_iter().map(|k| reduce_slice(&flakes.slice_at(k), most.max(1))).collect();
+    let mut reduced = Flakes {
+        theta_h: flakes.theta_h.clone(),
+        theta_d: flakes.theta_d.clone(),
+        offsets: vec![0],
+        probability: Vec::new(),
+        lower: Vec::new(),
+        upper: Vec::new(),
+        texture: flakes.texture,
+    };
+    for slice in slices {
+        for (p, lower, upper) in slice {
+            reduced.probability.push(p);
+            reduced.lower.push(lower);
+            reduced.upper.push(upper);
+        }
+        reduced.offsets.push(u32::try_from(reduced.probability.len()).unwrap_or(u32::MAX));
+    }
+    reduced
+}
+
+fn reduce_slice(slice: &Slice<'_>, most: usize) -> Vec<(f64, [f32; 3], [f32; 3])> {
+    let mut heaps: Vec<Heap> = (0..slice.probability.len()).map(|k| Heap::of(slice, k)).collect();
+    while heaps.len() > most {
+        merge_nearest(&mut heaps, most);
+    }
+    heaps.sort_by(|x, y| x.center[0].total_cmp(&y.center[0]));
+    heaps.iter().map(Heap::boxed).collect()
+}
+
+impl Heap {
+    fn of(slice: &Slice<'_>, k: usize) -> Self {
+        let (lower, upper) = (slice.lower[k], slice.upper[k]);
+        let half: [f64; 3] = std::array::from_fn(|a| (f64::from(upper[a]) - f64::from(lower[a])) / 2.0);
+        Self {
+            mass: slice.probability[k],
+            center: slice.center(k),
+            variance: half.map(|h| h * h / 3.0),
+            linear: mean_color(lower, upper),
+            own: Some((lower, upper)),
+        }
+    }
+
+    /// How much mass moves how far when two become one.
+    fn distance(&self, other: &Self) -> f64 {
+        let squared: f64 = self.center.iter().zip(other.center).map(|(c, d)| (c - d) * (c - d)).sum();
+        self.mass * other.mass / (self.mass + other.mass).max(f64::MIN_POSITIVE) * squared
+    }
+
+    fn with(&self, other: &Self) -> Self {
+        let mass = self.mass + other.mass;
+        let share = if mass > 0.0 { other.mass / mass } else { 0.5 };
+        let mix = |x: f64, y: f64| x + (y - x) * share;
+        let center: [f64; 3] = std::array::from_fn(|a| mix(self.center[a], other.center[a]));
+        let spread = |heap: &Self, a: usize| heap.variance[a] + (heap.center[a] - center[a]).powi(2);
+        Self {
+            mass,
+            center,
+            variance: std::array::from_fn(|a| mix(spread(self, a), spread(other, a))),
+            linear: std::array::from_fn(|c| mix(self.linear[c], other.linear[c])),
+            own: None,
+        }
+    }
+
+    fn boxed(&self) -> (f64, [f32; 3], [f32; 3]) {
+        if let Some((lower, upper)) = self.own {
+            return (self.mass, lower, upper);
+        }
+        let half = self.variance.map(|v| (3.0 * v).sqrt());
+        let center = center_of_mean(half, self.linear, self.center);
+        #[allow(clippy::cast_possible_truncation)] // boxes are kept at texel precision
+        let corner = |side: f64| std::array::from_fn(|a| (center[a] + side * half[a]) as f32);
+        (self.mass, corner(-1.0), corner(1.0))
+    }
+}
+
+/// Merges pairs, nearest first, until `most` are left. Each heap remembers its nearest later one.
+fn merge_nearest(heaps: &mut Vec<Heap>, most: usize) {
+    let nearest_after = |heaps: &[Heap], i: usize| {
+        let mut best = (usize::MAX, f64::INFINITY);
+        for j in i + 1..heaps.len() {
+            let distance = heaps[i].distance(&heaps[j]);
+            if distance < best.1 {
+                best = (j, distance);
+            }
+        }
+        best
+    };
+    let mut nearest: Vec<(usize, f64)> = (0..heaps.len()).map(|i| nearest_after(heaps, i)).collect();
+    while heaps.len() > most {
+        let Some(i) = (0..heaps.len() - 1).min_by(|&x, &y| nearest[x].1.total_cmp(&nearest[y].1)) else { return };
+        let j = nearest[i].0.min(heaps.len() - 1);
+        let merged = heaps[i].with(&heaps[j]);
+        heaps[i] = merged;
+        // Later heaps move down by one place, so every index beyond j does too.
+        heaps.remove(j);
+        nearest.remove(j);
+        for k in 0..heaps.len() {
+            let known = nearest[k].0;
+            if k == i || known == i || known == j {
+                nearest[k] = nearest_after(heaps, k);
+                continue;
+            }
+            if known != usize::MAX && known > j {
+                nearest[k].0 = known - 1;
+            }
+            if k < i {
+                let distance = heaps[k].distance(&heaps[i]);
+                if distance < nearest[k].1 {
+                    nearest[k] = (i, distance);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paint::{AngleGrid, FlakeTexture};
+
+    fn flakes(count: u32) -> Flakes {
+        let spread = |k: u32, step: u32| f64::from(k * step % 97) as f32;
+        let lower: Vec<[f32; 3]> = (0..count).map(|k| [spread(k, 31), spread(k, 17) - 48.0, spread(k, 53) - 48.0]).collect();
+        Flakes {
+            theta_h: AngleGrid::single(),
+            theta_d: AngleGrid::single(),
+            offsets: vec![0, count],
+            probability: vec![1.0 / f64::from(count); count as usize],
+            upper: lower.iter().map(|l| l.map(|v| v + 3.0)).collect(),
+            lower,
+            texture: FlakeTexture { texel_um: 20.0, grain_um: 12.0, lifetime_deg: [4.0; 2], persistence_deg: [8.0; 2] },
+        }
+    }
+
+    #[test]
+    fn mass_and_mean_light_are_kept() {
+        let many = flakes(99);
+        let few = reduce_clusters(&many, 50);
+        assert_eq!(few.widest_slice(), 50);
+        assert!((few.probability.iter().sum::<f64>() - 1.0).abs() < 1e-13);
+        let (want, got) = (many.slice_at(0).mean(), few.slice_at(0).mean());
+        for (x, y) in want.iter().zip(got) {
+            assert!((x - y).abs() < 1e-5 * x.abs(), "{x} {y}");
+        }
+        assert!(few.lower.windows(2).all(|w| w[0][0] <= w[1][0] + 60.0));
+    }
+
+    #[test]
+    fn few_enough_clusters_stay_as_they_are() {
+        let mut few = flakes(20);
+        let reduced = reduce_clusters(&few, 50);
+        assert_eq!(reduced.probability, few.probability);
+        few.lower.sort_by(|x, y| x[0].total_cmp(&y[0]));
+        assert_eq!(reduced.lower.iter().map(|l| l[0]).collect::<Vec<_>>(), few.lower.iter().map(|l| l[0]).collect::<Vec<_>>());
+    }
+}

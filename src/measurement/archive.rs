@@ -1,0 +1,195 @@
+//! The files of a package, by name: a zip archive or a folder.
+//!
+//! Any number of threads may read at once. Nothing but the archive's directory is kept; a file is read when it is asked
+//! for, and never more of it than the caller accepts, whatever the archive says about its size. Names come from the
+//! package itself and are not trusted: they never leave the folder.
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+use bytes::Bytes;
+use zip::read::{ZipArchiveMetadata, ZipReadOptions};
+use zip::{CompressionMethod, ZipArchive};
+
+use super::package::PackageError;
+use crate::paint::Limits;
+
+/// Where the bytes of an archive are.
+#[derive(Clone, Debug)]
+pub(super) enum Source {
+    File(Arc<File>),
+    Memory(Bytes),
+}
+
+/// The files of a package.
+#[derive(Clone, Debug)]
+pub(super) enum Archive {
+    Zip { source: Source, directory: Arc<ZipArchiveMetadata>, index: Arc<std::collections::HashMap<String, usize>> },
+    Folder(PathBuf),
+}
+
+/// A reading position of its own in a shared source.
+struct Cursor {
+    source: Source,
+    position: u64,
+    length: u64,
+}
+
+impl Cursor {
+    fn new(source: Source) -> io::Result<Self> {
+        let length = match &source {
+            Source::File(file) => file.metadata()?.len(),
+            Source::Memory(bytes) => bytes.len() as u64,
+        };
+        Ok(Self { source, position: 0, length })
+    }
+}
+
+#[cfg(unix)]
+fn read_at(file: &File, into: &mut [u8], offset: u64) -> io::Result<usize> {
+    std::os::unix::fs::FileExt::read_at(file, into, offset)
+}
+
+#[cfg(windows)]
+fn read_at(file: &File, into: &mut [u8], offset: u64) -> io::Result<usize> {
+    std::os::windows::fs::FileExt::seek_read(file, into, offset)
+}
+
+impl Read for Cursor {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let count = match &self.source {
+            Source::File(file) => read_at(file, into, self.position)?,
+            Source::Memory(bytes) => {
+                let start = usize::try_from(self.position).unwrap_or(usize::MAX).min(bytes.len());
+                (&bytes[start..]).read(into)?
+            }
+        };
+        self.position += count as u64;
+        Ok(count)
+    }
+}
+
+impl Seek for Cursor {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let position = match to {
+            SeekFrom::Start(offset) => Some(offset),
+            SeekFrom::End(offset) => self.length.checked_add_signed(offset),
+            SeekFrom::Current(offset) => self.position.checked_add_signed(offset),
+        };
+        self.position = position.ok_or_else(|| io::Error::from(io::ErrorKind::InvalidInput))?;
+        Ok(self.position)
+    }
+}
+
+impl Archive {
+    /// A zip archive in memory.
+    pub(super) fn in_memory(bytes: Bytes, limits: &Limits) -> Result<Self, PackageError> {
+        Self::zip(Source::Memory(bytes), limits)
+    }
+
+    /// A zip archive or a folder on disk.
+    pub(super) fn at(path: &Path, limits: &Limits) -> Result<Self, PackageError> {
+        let open = |source| PackageError::Open { path: path.to_owned(), source };
+        if path.metadata().map_err(open)?.is_dir() {
+            return Ok(Self::Folder(path.to_owned()));
+        }
+        Self::zip(Source::File(Arc::new(File::open(path).map_err(open)?)), limits)
+    }
+
+    /// A zip archive in an open file.
+    pub(super) fn in_file(file: File, limits: &Limits) -> Result<Self, PackageError> {
+        Self::zip(Source::File(Arc::new(file)), limits)
+    }
+
+    fn zip(source: Source, limits: &Limits) -> Result<Self, PackageError> {
+        let archive = |error: &dyn std::fmt::Display| PackageError::Archive { reason: error.to_string() };
+        let cursor = Cursor::new(source.clone()).map_err(|e| archive(&e))?;
+        if cursor.length > limits.bytes {
+            return Err(PackageError::Size { file: "the package".into(), bytes: cursor.length, accepted: limits.bytes });
+        }
+        let directory = ZipArchive::new(cursor).map_err(|e| archive(&e))?.metadata();
+        if directory.len() > limits.entries {
+            return Err(PackageError::Entries { count: directory.len(), accepted: limits.entries });
+        }
+        if directory.has_duplicate_names() {
+            return Err(PackageError::Archive { reason: "it holds two files of one name".into() });
+        }
+        let mut index = std::collections::HashMap::with_capacity(directory.len());
+        for k in 0..directory.len() {
+            let entry = directory.entry(k).map_err(|e| archive(&e))?;
+            index.insert(String::from_utf8_lossy(entry.name_raw()).into_owned(), k);
+        }
+        Ok(Self::Zip { source, directory, index: Arc::new(index) })
+    }
+
+    /// Whether there is a file of this name.
+    pub(super) fn holds(&self, name: &str) -> bool {
+        match self {
+            Self::Zip { index, .. } => index.contains_key(name),
+            Self::Folder(folder) => within(folder, name).is_some_and(|path| path.is_file()),
+        }
+    }
+
+    /// Replaces `into` by the file of this name, at most `most` bytes of it.
+    pub(super) fn read(&self, name: &str, most: u64, into: &mut Vec<u8>) -> Result<(), PackageError> {
+        into.clear();
+        let damaged = |reason: String| PackageError::Damaged { file: name.to_owned(), reason };
+        let too_large = |bytes| PackageError::Size { file: name.to_owned(), bytes, accepted: most };
+        let missing = || PackageError::Missing { file: name.to_owned() };
+        match self {
+            Self::Zip { source, directory, index } => {
+                let entry = index.get(name).ok_or_else(missing)?;
+                let entry = directory.entry(*entry).map_err(|e| damaged(e.to_string()))?;
+                if entry.size() > most {
+                    return Err(too_large(entry.size()));
+                }
+                let method = entry.compression();
+                if entry.encrypted() || !matches!(method, CompressionMethod::Stored | CompressionMethod::Deflated) {
+                    return Err(damaged(format!("packed by {method:?}, accepted is stored or deflated, unencrypted")));
+                }
+                let size = usize::try_from(entry.size()).map_err(|_| too_large(entry.size()))?;
+                let mut cursor = Cursor::new(source.clone()).map_err(|e| damaged(e.to_string()))?;
+                let file = entry.with_reader(&mut cursor, ZipReadOptions::new());
+                let mut file = file.map_err(|e| damaged(e.to_string()))?;
+                // The directory's size is a claim: memory grows with what really comes.
+                into.reserve(size.min(1 << 20));
+                (&mut file).take(most + 1).read_to_end(into).map_err(|e| damaged(e.to_string()))?;
+            }
+            Self::Folder(folder) => {
+                let path = within(folder, name).ok_or_else(missing)?;
+                let file = File::open(path).map_err(|e| match e.kind() {
+                    io::ErrorKind::NotFound => missing(),
+                    _ => damaged(e.to_string()),
+                })?;
+                file.take(most + 1).read_to_end(into).map_err(|e| damaged(e.to_string()))?;
+            }
+        }
+        if into.len() as u64 > most {
+            return Err(too_large(into.len() as u64));
+        }
+        Ok(())
+    }
+}
+
+/// Path of a name inside a folder; `None` for a name that would leave it.
+fn within(folder: &Path, name: &str) -> Option<PathBuf> {
+    let name = Path::new(name);
+    let inside = name.components().all(|part| matches!(part, Component::Normal(_)));
+    (inside && name.components().next().is_some()).then(|| folder.join(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_cannot_leave_the_folder() {
+        let folder = Path::new("/lab/silver");
+        assert_eq!(within(folder, "flakes/00_00.exr"), Some(folder.join("flakes/00_00.exr")));
+        for name in ["../blue/paint.json", "/etc/passwd", "flakes/../../x", ""] {
+            assert_eq!(within(folder, name), None, "{name}");
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! What surrounds the object: the built-in studio, one radiance everywhere, or a picture of the sky.
+//!
+//! A picture is a latitude-longitude map, linear sRGB, y up: `u = atan2(x, −z)/2π`, `v = acos(y)/π`, row 0 at +y,
+//! bilinear, wrapped in u. Files are read by [`Environment::from_bytes`].
+
+use std::f32::consts::{PI, TAU};
+
+use super::studio::Studio;
+use super::vector::{Vec3, mix};
+
+/// The surroundings, as radiance by direction.
+#[derive(Clone, Debug)]
+pub struct Environment(Source);
+
+#[derive(Clone, Debug)]
+pub(super) enum Source {
+    Studio(Studio),
+    Uniform(Vec3),
+    Map(Map),
+}
+
+/// A latitude-longitude picture.
+#[derive(Clone, Debug)]
+pub(super) struct Map {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) pixels: Vec<Vec3>,
+}
+
+impl Default for Environment {
+    fn default() -> Self {
+        Self::studio()
+    }
+}
+
+impl Environment {
+    /// The built-in studio.
+    #[must_use]
+    pub fn studio() -> Self {
+        Self(Source::Studio(Studio::new()))
+    }
+
+    /// The same radiance from everywhere, a white furnace for 1.
+    #[must_use]
+    pub const fn uniform(radiance: Vec3) -> Self {
+        Self(Source::Uniform(radiance))
+    }
+
+    pub(super) const fn map(map: Map) -> Self {
+        Self(Source::Map(map))
+    }
+
+    pub(super) const fn source(&self) -> &Source {
+        &self.0
+    }
+
+    /// Radiance from a unit direction that points towards the surroundings.
+    #[must_use]
+    pub fn radiance(&self, direction: Vec3) -> Vec3 {
+        match &self.0 {
+            Source::Studio(studio) => studio.radiance(direction),
+            Source::Uniform(radiance) => *radiance,
+            Source::Map(map) => map.radiance(direction),
+        }
+    }
+
+    /// What a white diffuser turned upwards reflects: the brightness of these surroundings.
+    #[must_use]
+    pub fn level(&self) -> f32 {
+        let (rings, spokes) = (48_u16, 96_u16);
+        let mut sum = 0.0;
+        for ring in 0..rings {
+            // Even in cos², the share of light a ring adds.
+            let sine2 = (f32::from(ring) + 0.5) / f32::from(rings);
+            for spoke in 0..spokes {
+                let turn = TAU * (f32::from(spoke) + 0.5) / f32::from(spokes);
+                let direction = [sine2.sqrt() * turn.cos(), (1.0 - sine2).sqrt(), sine2.sqrt() * turn.sin()];
+                sum += luminance(self.radiance(direction));
+            }
+        }
+        sum / f32::from(rings) / f32::from(spokes)
+    }
+}
+
+pub(super) fn luminance(rgb: Vec3) -> f32 {
+    0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+}
+
+impl Map {
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn radiance(&self, d: Vec3) -> Vec3 {
+        let (w, h) = (self.width as f32, self.height as f32);
+        let u = (d[0].atan2(-d[2]) / TAU).rem_euclid(1.0) * w - 0.5;
+        let v = (d[1].clamp(-1.0, 1.0).acos() / PI * h - 0.5).clamp(0.0, h - 1.0);
+        let (left, top) = (u.floor(), v as usize);
+        let (x0, y1) = (left.rem_euclid(w) as usize % self.width, (top + 1).min(self.height - 1));
+        let x1 = (x0 + 1) % self.width;
+        let at = |x: usize, y: usize| self.pixels[y * self.width + x];
+        let (s, t) = (u - left, v - v.floor());
+        mix(mix(at(x0, top), at(x1, top), s), mix(at(x0, y1), at(x1, y1), s), t)
+    }
+
+    /// Direction of a place on the map, `u`, `v` in `0..1`.
+    pub(super) fn direction(u: f32, v: f32) -> Vec3 {
+        let (theta, turn) = (v * PI, u * TAU);
+        [theta.sin() * turn.sin(), theta.cos(), -theta.sin() * turn.cos()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_is_read_where_it_was_written() {
+        let (width, height) = (8, 4);
+        let pixels = (0..width * height).map(|k| [k as f32, 0.0, 1.0]).collect();
+        let environment = Environment::map(Map { width, height, pixels });
+        for y in 0..height {
+            for x in 0..width {
+                let d = Map::direction((x as f32 + 0.5) / 8.0, (y as f32 + 0.5) / 4.0);
+                let got = environment.radiance(d);
+                assert!((got[0] - (y * width + x) as f32).abs() < 1e-3, "{x} {y} {got:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_uniform_environment_has_its_own_level() {
+        assert!((Environment::uniform([0.7; 3]).level() - 0.7).abs() < 1e-4);
+    }
+}

@@ -1,0 +1,134 @@
+//! Environment pictures from `.hdr` (Radiance) and `.exr` files.
+//!
+//! Files come from strangers: sizes are checked against [`Limits`] before anything is allocated, a damaged file is an
+//! error that says what is wrong. Negative light counts as none; light above the range of a half is held there, which
+//! only a bare sun reaches.
+
+use std::io::Cursor;
+
+use exr::prelude::{ReadChannels, ReadLayers};
+use image::ImageDecoder;
+
+use super::environment::{Environment, Map};
+use super::vector::Vec3;
+use crate::paint::Limits;
+
+/// Most radiance a pixel may hold.
+const MOST_LIGHT: f32 = 65504.0;
+
+/// Why bytes are no environment.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EnvironmentError {
+    /// Neither of the formats that are read.
+    #[error("neither a Radiance .hdr nor an OpenEXR .exr picture")]
+    Format,
+    /// A file of one of the formats, damaged or of a kind that is not read.
+    #[error("{format}: {reason}")]
+    Damaged {
+        /// Format by its magic number.
+        format: &'static str,
+        /// What its reader says.
+        reason: String,
+    },
+    /// More pixels than are accepted.
+    #[error("{width} x {height} pixels are more than the {accepted} accepted")]
+    Size {
+        /// Pixels across.
+        width: u64,
+        /// Pixels down.
+        height: u64,
+        /// What would be accepted.
+        accepted: u64,
+    },
+    /// A pixel that is no light.
+    #[error("pixel ({x}, {y}) is not a number")]
+    NotANumber {
+        /// Column.
+        x: usize,
+        /// Row.
+        y: usize,
+    },
+}
+
+impl Environment {
+    /// A latitude-longitude picture from the bytes of an `.hdr` or `.exr` file.
+    ///
+    /// # Errors
+    ///
+    /// [`EnvironmentError`] for other formats, damaged files, too many pixels, and pixels that are not numbers.
+    pub fn from_bytes(bytes: &[u8], limits: &Limits) -> Result<Self, EnvironmentError> {
+        let (width, height, mut pixels) = if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+            read_exr(bytes, limits)?
+        } else if bytes.starts_with(b"#?") {
+            read_hdr(bytes, limits)?
+        } else {
+            return Err(EnvironmentError::Format);
+        };
+        for (k, pixel) in pixels.iter_mut().enumerate() {
+            if pixel.iter().any(|v| v.is_nan()) {
+                return Err(EnvironmentError::NotANumber { x: k % width, y: k / width });
+            }
+            *pixel = pixel.map(|v| v.clamp(0.0, MOST_LIGHT));
+        }
+        Ok(Self::map(Map { width, height, pixels }))
+    }
+}
+
+type Pixels = (usize, usize, Vec<Vec3>);
+
+fn check(width: u64, height: u64, limits: &Limits, format: &'static str) -> Result<(usize, usize), EnvironmentError> {
+    if width == 0 || height == 0 {
+        return Err(EnvironmentError::Damaged { format, reason: format!("{width} x {height} pixels") });
+    }
+    let too_large = || EnvironmentError::Size { width, height, accepted: limits.pixels };
+    if width.checked_mul(height).is_none_or(|pixels| pixels > limits.pixels) {
+        return Err(too_large());
+    }
+    let side = |v: u64| usize::try_from(v).map_err(|_| too_large());
+    Ok((side(width)?, side(height)?))
+}
+
+fn read_hdr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
+    const FORMAT: &str = "Radiance .hdr";
+    let damaged = |e: image::ImageError| EnvironmentError::Damaged { format: FORMAT, reason: e.to_string() };
+    let decoder = image::codecs::hdr::HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(damaged)?;
+    let (w, h) = decoder.dimensions();
+    let (width, height) = check(w.into(), h.into(), limits, FORMAT)?;
+    let mut pixels: Vec<Vec3> = vec![[0.0; 3]; width * height];
+    decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(damaged)?;
+    Ok((width, height, pixels))
+}
+
+fn read_exr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
+    const FORMAT: &str = "OpenEXR";
+    let damaged = |e: exr::error::Error| EnvironmentError::Damaged { format: FORMAT, reason: e.to_string() };
+    // The header alone first: the reader allocates what the header claims.
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
+    for header in &meta.headers {
+        let size = header.layer_size;
+        check(size.width() as u64, size.height() as u64, limits, FORMAT)?;
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| (size.width(), vec![[0.0_f32; 3]; size.width() * size.height()]),
+            |(width, pixels): &mut (usize, Vec<Vec3>), at, (r, g, b): (f32, f32, f32)| {
+                if let Some(pixel) = pixels.get_mut(at.y() * *width + at.x()) {
+                    *pixel = [r, g, b];
+                }
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(damaged)?;
+    let (width, pixels) = image.layer_data.channel_data.pixels;
+    let height = image.layer_data.size.height();
+    if pixels.len() != width * height || pixels.is_empty() {
+        return Err(EnvironmentError::Damaged { format: FORMAT, reason: "pixels are missing".into() });
+    }
+    Ok((width, height, pixels))
+}

@@ -1,0 +1,327 @@
+//! Light that leaves one point of the picture towards the camera.
+//!
+//! Per sample: the directional lights, one direction drawn by the environment's radiance and one by the paint's own
+//! lobes, weighted by the balance heuristic (E. Veach 1997), and the coat's mirror image. All samples of a pixel are
+//! one low-discrepancy set. Flakes belong to the texel under the sample, so a pixel averages the texels it covers.
+
+use super::effects::{Effect, EffectPlan};
+use super::environment::Source;
+use super::ground::Ground;
+use super::kernel::{Kernel, View};
+use super::lanes::{self, Lanes, Lanes3, WIDTH, get, set, splat3, times};
+use super::light_table::LightTable;
+use super::points::Points;
+use super::scene::{Background, Scene};
+use super::surface::{Hit, Surface};
+use super::vector::{Frame, Vec3, add, along, cross, dot, scale, smoothstep, sub, unit};
+use crate::paint::{CarPaint, RandomTexture, cell_spacing};
+
+/// Texels a side of the random texture's tile; every repetition of it is drawn anew.
+const TILE: u32 = 256;
+
+/// A scene prepared for shading one paint.
+pub(super) struct Shader<'a> {
+    scene: &'a Scene,
+    kernel: Kernel<'a>,
+    surface: Surface,
+    ground: Ground,
+    lights: Vec<(Vec3, Vec3)>,
+    light_table: Option<LightTable>,
+    texture: Option<Texture>,
+    /// Independent flakes a texel shows per solid angle of light.
+    flakes_per_sr: f32,
+    lens: Lens,
+    coated: bool,
+}
+
+struct Texture {
+    tile: RandomTexture,
+    texels_per_unit: f32,
+    /// Side of a cell, texels, at least 1.
+    cell: f32,
+}
+
+/// Samples of a pixel that are shaded together.
+struct Batch {
+    count: usize,
+    index: [u32; WIDTH],
+    point: Lanes3,
+    normal: Lanes3,
+    tangent: Lanes3,
+    side: Lanes3,
+    eye: Lanes3,
+    cells: [u32; WIDTH],
+    distance: Lanes,
+}
+
+impl Batch {
+    fn new() -> Self {
+        let zero = splat3([0.0; 3]);
+        let (x, y, z) = (splat3([1.0, 0.0, 0.0]), splat3([0.0, 1.0, 0.0]), splat3([0.0, 0.0, 1.0]));
+        Self { count: 0, index: [0; WIDTH], point: zero, normal: z, tangent: x, side: y, eye: z, cells: [0; WIDTH], distance: Lanes::splat(1.0) }
+    }
+
+    fn push(&mut self, index: u32, hit: Hit, eye: Vec3, cell: u32) {
+        let (k, frame) = (self.count, Frame::new(hit.normal, eye));
+        self.index[k] = index;
+        set(&mut self.point, k, hit.point);
+        set(&mut self.normal, k, hit.normal);
+        set(&mut self.tangent, k, frame.tangent);
+        set(&mut self.side, k, frame.side);
+        set(&mut self.eye, k, eye);
+        self.cells[k] = cell;
+        self.distance.0[k] = hit.distance;
+        self.count += 1;
+    }
+
+    /// World directions in the frames of the points.
+    fn local(&self, w: Lanes3) -> Lanes3 {
+        [lanes::dot(w, self.tangent), lanes::dot(w, self.side), lanes::dot(w, self.normal)]
+    }
+
+    /// World direction of a direction in the frame of one point.
+    fn world(&self, k: usize, w: Vec3) -> Vec3 {
+        let plane = along(scale(get(&self.tangent, k), w[0]), get(&self.side, k), w[1]);
+        along(plane, get(&self.normal, k), w[2])
+    }
+}
+
+/// Directions drawn from the environment per sample.
+const LIGHTS: u32 = 2;
+const LIGHTS_F: f32 = 2.0;
+
+/// Rays of the camera.
+struct Lens {
+    right: Vec3,
+    up: Vec3,
+    forward: Vec3,
+    half: [f32; 2],
+    pixel: [f32; 2],
+    /// Side of a pixel at distance 1.
+    pixel_size: f32,
+}
+
+impl<'a> Shader<'a> {
+    pub(super) fn new(paint: &'a CarPaint, scene: &'a Scene) -> (Self, EffectPlan) {
+        let light_table = LightTable::new(&scene.environment);
+        let plan = EffectPlan::new(paint, scene, light_table.is_some());
+        let surface = Surface::new(scene.shape);
+        let texture = paint.flakes.as_ref().map(|flakes| {
+            let t = &flakes.texture;
+            #[allow(clippy::cast_possible_truncation)] // pixels are f32
+            let texels_per_unit = (scene.object_mm * 500.0 / t.texel_um) as f32;
+            let spacing = cell_spacing(t.grain_um / t.texel_um);
+            let tile = RandomTexture::new(TILE, TILE, spacing, scene.seed);
+            #[allow(clippy::cast_possible_truncation)]
+            let cell = spacing.max(1.0) as f32;
+            Texture { tile, texels_per_unit, cell }
+        });
+        // Turning a light by an angle turns the half vector by half of it.
+        #[allow(clippy::cast_possible_truncation)]
+        let flakes_per_sr = paint.flakes.as_ref().map_or(1.0, |flakes| {
+            let [h, d] = flakes.texture.persistence_deg.map(f64::to_radians);
+            (1.0 / (4.0 * h * d)) as f32
+        });
+        let shader = Self {
+            scene,
+            flakes_per_sr,
+            kernel: Kernel::new(paint),
+            ground: Ground::new(&surface),
+            surface,
+            lights: scene.lights.iter().map(|light| (unit(light.towards), light.irradiance)).collect(),
+            light_table,
+            texture,
+            lens: Lens::new(scene),
+            coated: plan.has(Effect::Coat),
+        };
+        (shader, plan)
+    }
+
+    /// Mean radiance of a pixel.
+    pub(super) fn pixel(&self, x: u32, y: u32) -> Vec3 {
+        match (self.coated, self.texture.is_some()) {
+            (true, true) => self.pixel_of::<true, true>(x, y),
+            (true, false) => self.pixel_of::<true, false>(x, y),
+            (false, true) => self.pixel_of::<false, true>(x, y),
+            (false, false) => self.pixel_of::<false, false>(x, y),
+        }
+    }
+
+    fn pixel_of<const COATED: bool, const FLAKES: bool>(&self, x: u32, y: u32) -> Vec3 {
+        let count = self.scene.samples_per_pixel;
+        let points = Points::of_pixel(x, y, count, self.scene.seed);
+        let origin = self.scene.camera.origin;
+        let mut sum = [0.0; 3];
+        let mut batch = Batch::new();
+        for index in 0..count {
+            let (direction, place) = self.lens.ray(x, y, points.pair(index, 0));
+            match self.surface.meet(origin, direction) {
+                Some(hit) => {
+                    batch.push(index, hit, scale(direction, -1.0), self.cell::<FLAKES>(&hit));
+                    if batch.count == WIDTH {
+                        sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points));
+                        batch.count = 0;
+                    }
+                }
+                None => sum = add(sum, self.behind(origin, direction, place)),
+            }
+        }
+        if batch.count > 0 {
+            sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points));
+        }
+        #[allow(clippy::cast_precision_loss)] // a few thousand
+        scale(sum, 1.0 / count as f32)
+    }
+
+    /// Number of the texel at a point.
+    fn cell<const FLAKES: bool>(&self, hit: &Hit) -> u32 {
+        match &self.texture {
+            Some(texture) if FLAKES => {
+                let [x, y] = self.surface.texel(hit, texture.texels_per_unit);
+                texture.tile.at(x, y)
+            }
+            _ => 0,
+        }
+    }
+
+    /// Light that leaves the points of a batch, summed.
+    fn leaving<const COATED: bool, const FLAKES: bool>(&self, batch: &Batch, points: Points) -> Vec3 {
+        let view = self.kernel.view::<COATED>(batch.local(batch.eye));
+        let texels = if FLAKES { self.texels_seen(batch, &view) } else { Lanes::splat(1.0) };
+        let mut sum = [Lanes::splat(0.0); 3];
+        let mut shine = |light: Lanes3, power: Lanes3, drawn: Option<Lanes>, contrast: Lanes| {
+            let answer = self.kernel.evaluate::<COATED, FLAKES>(&view, light, &batch.cells, contrast);
+            let mut weight = light[2].at_least(0.0);
+            if let Some(density) = drawn {
+                weight = weight / (density + answer.density);
+            }
+            sum = std::array::from_fn(|k| sum[k] + answer.f[k] * power[k] * weight);
+        };
+        let lone = self.contrast(texels, 1.0);
+        for &(towards, irradiance) in &self.lights {
+            let light = batch.local(splat3(towards));
+            if light[2].0.iter().any(|&z| z > 0.0) {
+                shine(light, splat3(irradiance), None, lone);
+            }
+        }
+        if let Some(table) = &self.light_table {
+            let facing: [usize; WIDTH] = std::array::from_fn(|k| LightTable::facing(get(&batch.normal, k)));
+            let mut many = lone;
+            if FLAKES {
+                let extent = Lanes(facing.map(|k| table.extent(k)));
+                many = self.contrast(texels * (extent * self.flakes_per_sr).at_least(1.0), LIGHTS_F);
+            }
+            for draw in 0..LIGHTS {
+                let (mut directions, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
+                let mut density = Lanes::splat(1.0);
+                for k in 0..WIDTH {
+                    let drawn = table.sample(facing[k], points.pair(batch.index[k] * LIGHTS + draw, 1));
+                    set(&mut directions, k, drawn.direction);
+                    set(&mut power, k, drawn.light);
+                    density.0[k] = drawn.density;
+                }
+                let light = batch.local(directions);
+                if self.kernel.draws {
+                    shine(light, times(power, density), Some(density * LIGHTS_F), many);
+                } else {
+                    shine(light, times(power, Lanes::splat(1.0 / LIGHTS_F)), None, many);
+                }
+            }
+            if self.kernel.draws {
+                let (mut light, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
+                let mut density = Lanes::splat(1.0);
+                for k in 0..batch.count {
+                    let (pick, place) = (points.pair(batch.index[k], 3)[0], points.pair(batch.index[k], 2));
+                    if let Some(drawn) = self.kernel.sample::<COATED>(&view, k, pick, place) {
+                        let direction = batch.world(k, drawn);
+                        set(&mut light, k, drawn);
+                        set(&mut power, k, self.scene.environment.radiance(direction));
+                        density.0[k] = table.density(facing[k], direction);
+                    }
+                }
+                shine(light, power, Some(density * LIGHTS_F), many);
+            }
+        }
+        let mut light = [0.0; 3];
+        let mirror = if COATED { self.kernel.mirror(&view) } else { Lanes::splat(0.0) };
+        for k in 0..batch.count {
+            light = add(light, get(&sum, k));
+            if COATED && mirror.0[k] > 0.0 {
+                let direction = along(scale(get(&batch.normal, k), 2.0 * view.outer[2].0[k]), get(&batch.eye, k), -1.0);
+                light = along(light, self.around(get(&batch.point, k), direction), mirror.0[k]);
+            }
+        }
+        light
+    }
+
+    /// Independent texels under a pixel: its footprint on the paint over the size of a cell.
+    fn texels_seen(&self, batch: &Batch, view: &View) -> Lanes {
+        let Some(texture) = &self.texture else { return Lanes::splat(1.0) };
+        let side = self.lens.pixel_size * texture.texels_per_unit / texture.cell;
+        batch.distance * batch.distance * (side * side) / view.outer[2].at_least(0.05)
+    }
+
+    /// How much of a drawn flake's deviation from the mean a sample keeps.
+    ///
+    /// A pixel shows the mean of `independent` flakes but draws only as many as it has samples. Deviations are shrunk
+    /// to what is left of them in the mean of all, so that sparkle keeps its contrast and sampling adds no noise of its
+    /// own; with more samples than flakes every flake is drawn as it is.
+    #[allow(clippy::cast_precision_loss)] // a few thousand
+    fn contrast(&self, independent: Lanes, draws: f32) -> Lanes {
+        let drawn = self.scene.samples_per_pixel as f32 * draws;
+        (Lanes::splat(drawn) / independent.at_least(1.0)).min(Lanes::splat(1.0)).sqrt()
+    }
+
+    /// What a mirror on the object sees.
+    fn around(&self, point: Vec3, direction: Vec3) -> Vec3 {
+        let radiance = self.scene.environment.radiance(direction);
+        if let (Source::Studio(_), Some([x, z])) = (self.scene.environment.source(), Ground::meet(point, direction)) {
+            let shade = 1.0 - 0.9 * self.ground.occlusion(x, z);
+            // The floor's own radiance near the object, the studio's far from it.
+            return scale(radiance, shade);
+        }
+        radiance
+    }
+
+    /// What the camera sees beside the object.
+    fn behind(&self, origin: Vec3, direction: Vec3, place: [f32; 2]) -> Vec3 {
+        if self.scene.background == Background::Environment {
+            return self.scene.environment.radiance(direction);
+        }
+        let shade = Ground::meet(origin, direction).map_or(0.0, |[x, z]| self.ground.occlusion(x, z));
+        sweep(place, shade)
+    }
+}
+
+/// A neutral sweep: a pool of light behind the object, darker corners, the object's shadow on the floor.
+///
+/// `place` is −1 to 1 from the middle to the nearer edges of the picture, y upwards.
+fn sweep(place: [f32; 2], shade: f32) -> Vec3 {
+    let out = (place[0] * place[0] * 0.7 + (place[1] - 0.15).powi(2)).sqrt();
+    let light = 0.40 - 0.24 * smoothstep(0.0, 1.5, out) + 0.07 * smoothstep(-0.2, -1.0, place[1]);
+    [light * (1.0 - 0.86 * shade); 3]
+}
+
+impl Lens {
+    #[allow(clippy::cast_precision_loss)] // picture sizes
+    fn new(scene: &Scene) -> Self {
+        let forward = unit(sub(scene.camera.target, scene.camera.origin));
+        let level = cross(forward, [0.0, 1.0, 0.0]);
+        let right = if dot(level, level) > 1e-9 { unit(level) } else { [1.0, 0.0, 0.0] };
+        let tangent = (scene.camera.field_of_view_deg.to_radians() / 2.0).tan();
+        let [width, height] = scene.size.map(|s| s as f32);
+        let short = width.min(height);
+        let half = [tangent * width / short, tangent * height / short];
+        Self { right, up: cross(right, forward), forward, half, pixel: [2.0 / width, 2.0 / height], pixel_size: 2.0 * tangent / short }
+    }
+
+    /// Direction through a place in a pixel, and the place in the picture.
+    #[allow(clippy::cast_precision_loss)]
+    fn ray(&self, x: u32, y: u32, [u, v]: [f32; 2]) -> (Vec3, [f32; 2]) {
+        let place = [(x as f32 + u) * self.pixel[0] - 1.0, 1.0 - (y as f32 + v) * self.pixel[1]];
+        let sideways = along(self.forward, self.right, place[0] * self.half[0]);
+        let short = self.half[0].min(self.half[1]);
+        let even = [place[0] * self.half[0] / short, place[1] * self.half[1] / short];
+        (unit(along(sideways, self.up, place[1] * self.half[1])), even)
+    }
+}

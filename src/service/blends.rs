@@ -1,0 +1,203 @@
+//! Blends: the correspondence of two to five paints, found once.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use utoipa::ToSchema;
+
+use super::answer::{Answer, Keep};
+use super::app::{App, BlendOptions, Shelved};
+use super::documents::BlendDocument;
+use super::extract::{Address, Json, NoQuery};
+use super::ids;
+use super::paints::accuracy;
+use super::problem::{Kind, Problem, ProblemDocument};
+use super::runner::{self, Ended, JobDocument, UnderWay};
+use super::waiting::Prefer;
+use super::workbench::CalledOff;
+use super::works::{Accuracy, Preset, Thing};
+use crate::paint::PaintFile;
+use crate::store::{BlendRecord, JobKind};
+
+/// Paints to blend.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BlendOrder {
+    /// Ids of two to five paints. Weights of a realisation follow this order.
+    #[schema(min_items = 2, max_items = 5)]
+    paints: Vec<String>,
+    /// Accuracy.
+    profile: Option<Preset>,
+    /// Clusters per slice, in place of the profile's.
+    #[schema(minimum = 1, maximum = 4096)]
+    clusters: Option<u32>,
+}
+
+/// What a job needs to make a blend.
+#[derive(Debug, Serialize, Deserialize)]
+struct BlendRequest {
+    paints: Vec<String>,
+    accuracy: Accuracy,
+}
+
+/// Blend paints.
+///
+/// The same paints in the same order with the same options have the same id: asking again is safe, and the
+/// correspondence is found once, however many ask. Another order of the same paints is another blend, whose weights
+/// follow that order, of the same correspondence.
+#[utoipa::path(
+    post, path = "/v1/blends", tag = "blends",
+    params(("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`")),
+    request_body = BlendOrder,
+    responses(
+        (status = 200, description = "The blend, made before", body = BlendDocument),
+        (status = 201, description = "The blend", body = BlendDocument, headers(("Location" = String, description = "Its address"))),
+        (status = 202, description = "The job that makes it", body = JobDocument, headers(("Location" = String, description = "The job's address"))),
+        (status = 422, description = "Too few or too many paints, or unknown ones", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn create(
+    State(app): State<App>,
+    _: NoQuery,
+    prefer: Prefer,
+    Json(order): Json<BlendOrder>,
+) -> Result<Response, Problem> {
+    let most = app.config.limits.paints;
+    if !(2..=most).contains(&order.paints.len()) {
+        let detail = format!("{} paints are to be blended.", order.paints.len());
+        return Err(Problem::value("/paints", detail).accepting(format!("2 to {most} ids of paints")));
+    }
+    let refuse = |field: &str, detail: String| Problem::value(format!("/{field}"), detail);
+    let accuracy = accuracy("clusters", refuse, order.profile, order.clusters)?;
+    for (place, id) in order.paints.iter().enumerate() {
+        if !ids::is("p_", id) || app.catalogue.paint(id).await?.is_none() {
+            return Err(Problem::value(format!("/paints/{place}"), format!("There is no paint {id:?}."))
+                .accepting("ids that GET /v1/paints lists"));
+        }
+    }
+    let id = ids::made_of("b_", &(&order.paints, accuracy));
+    let address = format!("/v1/blends/{id}");
+    if app.catalogue.blend(&id).await?.is_some() {
+        let known = app.blend(&id).await?.document.clone();
+        let answer = Answer::result("application/json", known, Keep::Revalidated);
+        return Ok(answer.location(&address).into_response());
+    }
+    let request = BlendRequest { paints: order.paints, accuracy };
+    let job = runner::submit(&app, JobKind::Blend, &id, &request).await?;
+    let made = || async { Ok(app.blend(&id).await?.document.clone()) };
+    prefer.answer(&app, &job, &address, made).await
+}
+
+/// The job: finds the correspondence and keeps the blend.
+pub(super) async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Problem> {
+    let id = &under_way.job().subject;
+    if app.catalogue.blend(id).await?.is_some() {
+        return Ok(Ok(()));
+    }
+    let BlendRequest { paints, accuracy } = under_way.request()?;
+    under_way.stage("reading");
+    let mut shelved = Vec::with_capacity(paints.len());
+    for paint in &paints {
+        shelved.push(app.paint(paint).await?);
+    }
+    let (canonical, places) = in_order_of_hashes(shelved);
+    let names: Vec<&str> = canonical.iter().map(|paint| paint.id.as_str()).collect();
+    let key = ids::key("blend", &(&names, accuracy));
+    // Whichever order is asked for first finds the correspondence, the others wait for it.
+    let file = loop {
+        let (on, this, paints) = (app.clone(), Arc::clone(under_way), canonical.clone());
+        let compute = move || async move { correspond(&on, &this, paints, accuracy).await };
+        match app.results.get_or_compute(key, compute).await {
+            Ok(found) => break found.bytes,
+            Err(problem) if problem.kind() != Kind::JobCancelled => return Err(problem),
+            Err(_) if under_way.is_cancelled() || app.is_stopping() => return Ok(Err(CalledOff)),
+            // Another job was at it and was cancelled: this one takes over.
+            Err(_) => {}
+        }
+    };
+    under_way.stage("storing");
+    let _writing = app.removal.read().await;
+    let blend = app.blobs.put(file).await?.hash;
+    let options = serde_json::to_string(&BlendOptions { accuracy, places }).map_err(Problem::internal)?;
+    app.catalogue.add_blend(&BlendRecord { id: id.clone(), paints, options, blend }).await?;
+    Ok(Ok(()))
+}
+
+async fn correspond(
+    app: &App,
+    under_way: &Arc<UnderWay>,
+    paints: Vec<Arc<Shelved>>,
+    accuracy: Accuracy,
+) -> Result<Bytes, Problem> {
+    let works = Arc::clone(&app.works);
+    let found = under_way.compute(app, "blending", move |progress| {
+        let files: Vec<&PaintFile> = paints.iter().filter_map(|paint| paint.file_of_paint()).collect();
+        works.blend(&files, accuracy, progress).map(|blend| Bytes::from(blend.to_bytes()))
+    });
+    let Ok(found) = found.await? else {
+        return Err(Problem::new(Kind::JobCancelled, "The job that found this correspondence was cancelled."));
+    };
+    let file = found.map_err(|error| error.of_body())?;
+    app.metrics.blends_computed.increment(1);
+    Ok(file)
+}
+
+/// Paints in the order of their physical content, and where in it the paint asked for first, second, … is.
+fn in_order_of_hashes(asked: Vec<Arc<Shelved>>) -> (Vec<Arc<Shelved>>, Vec<usize>) {
+    let key = |paint: &Arc<Shelved>| {
+        let content = paint.file_of_paint().map(|file| file.paint.content_hash().to_hex().to_string());
+        (content, paint.id.clone())
+    };
+    let keys: Vec<_> = asked.iter().map(key).collect();
+    let mut order: Vec<usize> = (0..asked.len()).collect();
+    order.sort_by(|&x, &y| keys[x].cmp(&keys[y]));
+    let mut places = vec![0; asked.len()];
+    for (place, &k) in order.iter().enumerate() {
+        places[k] = place;
+    }
+    (order.iter().map(|&k| Arc::clone(&asked[k])).collect(), places)
+}
+
+impl Shelved {
+    fn file_of_paint(&self) -> Option<&PaintFile> {
+        match &self.thing {
+            Thing::Paint(file) => Some(file),
+            Thing::Blend(_) => None,
+        }
+    }
+}
+
+/// What is known about a blend.
+#[utoipa::path(
+    get, path = "/v1/blends/{id}", tag = "blends", params(("id" = String, Path, description = "Blend")),
+    responses(
+        (status = 200, description = "The blend", body = BlendDocument),
+        (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn show(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Answer, Problem> {
+    let blend = app.blend(&id).await?;
+    Ok(Answer::result("application/json", blend.document.clone(), Keep::Revalidated))
+}
+
+/// What was asked for, and addresses of what can be made of it.
+pub(super) fn links(id: &str, paints: &[String], options: &BlendOptions) -> Value {
+    let base = format!("/v1/blends/{id}");
+    let weights = vec![(1.0 / f64::from(u32::try_from(paints.len()).unwrap_or(1))).to_string(); paints.len()].join(",");
+    json!({
+        "request": { "paints": paints, "profile": options.accuracy.profile, "clusters": options.accuracy.clusters },
+        "links": {
+            "self": base,
+            "paints": paints.iter().map(|paint| format!("/v1/paints/{paint}")).collect::<Vec<_>>(),
+            "preview": format!("{base}/preview.png?weights={weights}"),
+            "bundle": format!("{base}/realisation.zip?weights={weights}"),
+            "glb": format!("{base}/realisation.glb?weights={weights}"),
+        }
+    })
+}

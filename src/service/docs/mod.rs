@@ -1,0 +1,90 @@
+//! The documentation: `/openapi.json`, a page that shows it without the internet, and what each problem means.
+
+use axum::http::{HeaderName, header};
+use utoipa::OpenApi;
+
+use super::answer::{Answer, Keep};
+use super::extract::Address;
+use super::problem::{Kind, Problem, ProblemDocument};
+use super::{blends, documents, jobs, operations, paints, previews, realisations, runner, works};
+
+/// Only what this service itself serves.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; base-uri 'none'";
+
+/// The interface as OpenAPI 3.1.
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "carpaint",
+        description = "Material synthesis for car paints: upload measurements, blend them, take realisations and pictures.\n\nEvery answer has a strong `ETag`, `Server-Timing` and `X-Request-Id`; `If-None-Match` is answered with 304. Every error is `application/problem+json` (RFC 9457). Unknown fields and parameters are refused. Requests that cannot be taken on now are answered with 503 and `Retry-After`.",
+        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
+    ),
+    paths(
+        paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete,
+        blends::create, blends::show,
+        realisations::of_blend, realisations::of_paint,
+        previews::of_blend, previews::of_paint,
+        jobs::show, jobs::events, jobs::cancel,
+        operations::healthz, operations::readyz, operations::metrics,
+    ),
+    components(schemas(
+        documents::PaintDocument, documents::PaintList, documents::PaintSummary, documents::BlendDocument,
+        blends::BlendOrder, runner::JobDocument, operations::Health, ProblemDocument,
+        works::Preset, works::Layout, works::ThetaH, works::Format, works::PictureFormat, works::Scene,
+    )),
+    tags(
+        (name = "paints", description = "Uploads become paints"),
+        (name = "blends", description = "Correspondences of two to five paints"),
+        (name = "realisations", description = "Paints, and blends at some weights, as files"),
+        (name = "previews", description = "The same as pictures"),
+        (name = "jobs", description = "Work that takes longer"),
+        (name = "operations", description = "For the operator"),
+    )
+)]
+#[derive(Clone, Copy, Debug)]
+pub struct Interface;
+
+/// The interface as it is served and committed.
+///
+/// # Panics
+///
+/// Never: the interface is plain data.
+#[must_use]
+pub fn interface() -> String {
+    let mut text = Interface::openapi().to_pretty_json().expect("plain data serialises");
+    text.push('\n');
+    text
+}
+
+/// `/openapi.json`
+pub async fn openapi() -> Answer {
+    Answer::bytes("application/json", interface(), Keep::Revalidated)
+}
+
+/// `/docs`
+pub async fn page() -> Answer {
+    Answer::bytes("text/html; charset=utf-8", &include_bytes!("page.html")[..], Keep::Revalidated)
+        .header(header::CONTENT_SECURITY_POLICY, POLICY)
+        .header(HeaderName::from_static("referrer-policy"), "no-referrer")
+}
+
+/// `/docs/page.js`
+pub async fn script() -> Answer {
+    Answer::bytes("text/javascript; charset=utf-8", &include_bytes!("page.js")[..], Keep::Revalidated)
+}
+
+/// `/docs/page.css`
+pub async fn style() -> Answer {
+    Answer::bytes("text/css; charset=utf-8", &include_bytes!("page.css")[..], Keep::Revalidated)
+}
+
+/// `/problems/{kind}`: what the `type` of a problem means.
+pub async fn problem(Address(name): Address<String>) -> Result<Answer, Problem> {
+    let kind = Kind::ALL.into_iter().find(|kind| kind.told().0 == name);
+    let (_, title, status) = kind.map(Kind::told).ok_or_else(|| {
+        let names: Vec<&str> = Kind::ALL.into_iter().map(|kind| kind.told().0).collect();
+        Problem::new(Kind::UnknownAddress, format!("There is no problem called {name:?}.")).accepting(names.join(", "))
+    })?;
+    let told = serde_json::json!({ "type": format!("/problems/{name}"), "title": title, "status": status.as_u16() });
+    Ok(Answer::json(&told, Keep::Revalidated))
+}

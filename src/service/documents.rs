@@ -1,0 +1,109 @@
+//! What is told about paints and blends.
+
+use bytes::Bytes;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+use utoipa::ToSchema;
+
+use crate::store::{CachedResult, Hash};
+
+/// A paint: everything known about it.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct PaintDocument {
+    /// Address: `p_` and 32 hexadecimal digits.
+    #[schema(pattern = "^p_[0-9a-f]{32}$")]
+    pub id: String,
+    /// Name.
+    pub name: String,
+    /// BLAKE3 of the physical content: equal for equal paints of different names.
+    pub hash: String,
+    /// Where it comes from.
+    #[schema(value_type = Object)]
+    pub provenance: Value,
+    /// Coat, diffuse albedo, lobes, color table.
+    #[schema(value_type = Object)]
+    pub parameters: Value,
+    /// Flake statistics: angles, clusters, grain and lifetime; null for a solid color.
+    #[schema(value_type = Option<Object>)]
+    pub flakes: Value,
+    /// Lab at the six instrument geometries.
+    #[schema(value_type = Object)]
+    pub readings: Value,
+    /// How far the fit is from its measurement, with the floor beside it; null where nothing was fitted.
+    #[schema(value_type = Option<Object>)]
+    pub residuals: Value,
+    /// Energy certificate: directional albedo at six incidences.
+    #[schema(value_type = Object)]
+    pub energy: Value,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Addresses of what can be made of it.
+    #[schema(value_type = Object)]
+    pub links: Value,
+}
+
+/// A blend: its paints and how they correspond.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct BlendDocument {
+    /// Address: `b_` and 32 hexadecimal digits.
+    #[schema(pattern = "^b_[0-9a-f]{32}$")]
+    pub id: String,
+    /// Names and content hashes of the paints, in the order of weights.
+    #[schema(value_type = Vec<Object>)]
+    pub paints: Value,
+    /// How the correspondence was found.
+    #[schema(value_type = Object)]
+    pub settings: Value,
+    /// How good it is: slices, clusters, cost, gap to the dual bound.
+    #[schema(value_type = Object)]
+    pub correspondence: Value,
+    /// Common angles and the paints' textures; null when no paint has flakes.
+    #[schema(value_type = Option<Object>)]
+    pub flakes: Value,
+    /// What was asked for.
+    #[schema(value_type = Object)]
+    pub request: Value,
+    /// Addresses of what can be made of it.
+    #[schema(value_type = Object)]
+    pub links: Value,
+}
+
+/// A paint in a list.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct PaintSummary {
+    /// Address.
+    #[schema(pattern = "^p_[0-9a-f]{32}$")]
+    pub id: String,
+    /// Name.
+    pub name: String,
+    /// Kind of source: `package`, `rgl`, `mpi-2005`, `merl`, `sample`, `blend`.
+    pub source: String,
+    /// BLAKE3 of the physical content.
+    pub hash: String,
+    /// Where it is.
+    #[schema(format = "uri-reference")]
+    pub href: String,
+}
+
+/// A page of paints.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct PaintList {
+    /// The paints, in the order they came.
+    pub paints: Vec<PaintSummary>,
+    /// Cursor of the next page; null after the last.
+    pub next: Option<String>,
+}
+
+/// The document of a description: with its id, and what the service adds.
+pub fn described(id: &str, description: Value, extra: Value) -> CachedResult {
+    let mut document = match description {
+        Value::Object(fields) => fields,
+        other => Map::from_iter([("description".to_owned(), other)]),
+    };
+    document.insert("id".to_owned(), json!(id));
+    if let Value::Object(extra) = extra {
+        document.extend(extra);
+    }
+    let bytes = Bytes::from(Value::Object(document).to_string());
+    CachedResult { hash: Hash::of(&bytes), bytes }
+}

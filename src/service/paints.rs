@@ -1,0 +1,390 @@
+//! Paints: uploads become paints, which can be listed, read, taken back and deleted.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use futures::StreamExt;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use utoipa::IntoParams;
+
+use super::answer::{Answer, Keep};
+use super::app::App;
+use super::documents::{PaintDocument, PaintList, PaintSummary};
+use super::extract::{Address, NoQuery, Query};
+use super::ids;
+use super::problem::{Kind, Problem, ProblemDocument};
+use super::runner::{self, Ended, JobDocument, UnderWay};
+use super::waiting::Prefer;
+use super::workbench::CalledOff;
+use super::works::{Accuracy, Format, IngestOrder, Layout, Preset, ThetaH};
+use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
+
+/// Longest silence in the middle of an upload.
+const SILENCE: Duration = Duration::from_secs(30);
+
+/// Longest name of a paint, characters.
+const LONGEST_NAME: usize = 200;
+
+/// Longest page of a list.
+const LONGEST_PAGE: u32 = 200;
+
+/// How an upload is read and fitted.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct IngestQuery {
+    /// Name of the paint, in place of the measurement's own.
+    #[param(min_length = 1, max_length = 200)]
+    name: Option<String>,
+    /// What the file is, where its bytes do not say.
+    layout: Option<Layout>,
+    /// Spacing of `theta_h` in an MPI 2005 table.
+    theta_h: Option<ThetaH>,
+    /// Bytes before the values of an MPI 2005 table, 84 unless given.
+    #[param(maximum = 1_048_576)]
+    header_bytes: Option<u64>,
+    /// Give the paint a clear coat of this index of refraction; otherwise the fit decides.
+    #[param(minimum = 1.0, maximum = 4.0)]
+    coat_ior: Option<f64>,
+    /// Accuracy.
+    profile: Option<Preset>,
+    /// Clusters per slice, in place of the profile's.
+    #[param(minimum = 1, maximum = 4096)]
+    clusters: Option<u32>,
+}
+
+/// Which paints to list.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ListQuery {
+    /// Words that name or source contain, whatever the case.
+    q: Option<String>,
+    /// `next` of the page before.
+    cursor: Option<String>,
+    /// Most paints on the page, 50 unless given.
+    #[param(minimum = 1, maximum = 200)]
+    limit: Option<u32>,
+}
+
+/// What a job needs to make a paint.
+#[derive(Debug, Serialize, Deserialize)]
+struct IngestRequest {
+    upload: Hash64,
+    order: IngestOrder,
+}
+
+/// A hash in JSON.
+#[derive(Debug, Serialize, Deserialize)]
+struct Hash64(String);
+
+impl Hash64 {
+    fn hash(&self) -> Result<Hash, Problem> {
+        self.0.parse().map_err(Problem::internal)
+    }
+}
+
+impl IngestQuery {
+    fn order(self) -> Result<IngestOrder, Problem> {
+        if let Some(name) = &self.name
+            && (!(1..=LONGEST_NAME).contains(&name.chars().count()) || name.chars().any(char::is_control))
+        {
+            return Err(Problem::parameter("name", "The name is empty, too long, or holds control characters.")
+                .accepting("1 to 200 printable characters"));
+        }
+        if let Some(ior) = self.coat_ior
+            && !(1.0..=4.0).contains(&ior)
+        {
+            return Err(Problem::parameter("coat_ior", format!("coat_ior is {ior}.")).accepting("1 to 4"));
+        }
+        if let Some(bytes) = self.header_bytes
+            && bytes > 1 << 20
+        {
+            return Err(
+                Problem::parameter("header_bytes", format!("header_bytes is {bytes}.")).accepting("0 to 1048576")
+            );
+        }
+        Ok(IngestOrder {
+            name: self.name,
+            layout: self.layout,
+            theta_h: self.theta_h,
+            header_bytes: self.header_bytes,
+            coat_ior: self.coat_ior,
+            accuracy: accuracy("clusters", Problem::parameter, self.profile, self.clusters)?,
+        })
+    }
+}
+
+/// An accuracy, with its clusters in range.
+pub(super) fn accuracy(
+    field: &str,
+    refuse: impl FnOnce(&str, String) -> Problem,
+    profile: Option<Preset>,
+    clusters: Option<u32>,
+) -> Result<Accuracy, Problem> {
+    match clusters {
+        Some(clusters) if !(1..=4096).contains(&clusters) => {
+            Err(refuse(field, format!("clusters is {clusters}.")).accepting("1 to 4096"))
+        }
+        _ => Ok(Accuracy { profile: profile.unwrap_or_default(), clusters }),
+    }
+}
+
+/// Upload a measurement.
+///
+/// The body is the file itself: a measured-paint package (.zip), an RGL `.bsdf`, an MPI 2005 table, a MERL binary, or a
+/// `.paint`. It is streamed to disk. The same bytes with the same options have the same id: asking again is safe, and
+/// answers at once. `Prefer: wait=N` waits up to N seconds for the paint; otherwise what takes more than 3 seconds is
+/// answered with the job that goes on.
+#[utoipa::path(
+    post, path = "/v1/paints", tag = "paints", params(IngestQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`")),
+    request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "The measurement"),
+    responses(
+        (status = 200, description = "The paint, made of the same upload before", body = PaintDocument),
+        (status = 201, description = "The paint", body = PaintDocument, headers(("Location" = String, description = "Its address"))),
+        (status = 202, description = "The job that makes it", body = JobDocument, headers(("Location" = String, description = "The job's address"))),
+        (status = 413, description = "The upload is too large", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "The upload is no measurement, or a damaged one", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn upload(
+    State(app): State<App>,
+    Query(query): Query<IngestQuery>,
+    prefer: Prefer,
+    request: Request,
+) -> Result<Response, Problem> {
+    let order = query.order()?;
+    let (parts, body) = request.into_parts();
+    check_headers(&app, &parts.headers)?;
+    let received = receive(&app, body).await?;
+    // Until a job names the upload it must not be swept as nobody's.
+    let naming = app.removal.read().await;
+    let stored = received.finish().await?;
+    let id = ids::made_of("p_", &(stored.hash.to_string(), &order));
+    let address = format!("/v1/paints/{id}");
+    if app.catalogue.paint(&id).await?.is_some() {
+        drop(naming);
+        let known = app.paint(&id).await?;
+        return Ok(Answer::result("application/json", known.document.clone(), Keep::Revalidated)
+            .location(&address)
+            .into_response());
+    }
+    let request = IngestRequest { upload: Hash64(stored.hash.to_string()), order };
+    let job = runner::submit(&app, JobKind::Ingest, &id, &request).await;
+    drop(naming);
+    let job = match job {
+        Ok(job) => job,
+        Err(problem) => {
+            app.forget_upload(stored.hash).await?;
+            return Err(problem);
+        }
+    };
+    let made = || async { Ok(app.paint(&id).await?.document.clone()) };
+    prefer.answer(&app, &job, &address, made).await
+}
+
+fn check_headers(app: &App, headers: &HeaderMap) -> Result<(), Problem> {
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+    if text(header::CONTENT_TYPE).is_some_and(|kind| kind.starts_with("multipart/")) {
+        let problem = Problem::new(Kind::UnsupportedMediaType, "The upload is wrapped in a multipart form.");
+        return Err(problem.accepting("the file's bytes as the body, as curl --data-binary @FILE sends them"));
+    }
+    if let Some(encoding) = text(header::CONTENT_ENCODING).filter(|encoding| *encoding != "identity") {
+        let problem = Problem::new(Kind::UnsupportedMediaType, format!("The upload is encoded as {encoding:?}."));
+        return Err(problem.accepting("the file's bytes as they are"));
+    }
+    let announced: u64 = text(header::CONTENT_LENGTH).and_then(|length| length.parse().ok()).unwrap_or(0);
+    if announced > app.config.limits.bytes { Err(too_large(app)) } else { Ok(()) }
+}
+
+fn too_large(app: &App) -> Problem {
+    Problem::new(Kind::TooLarge, "The upload is too large.")
+        .accepting(format!("up to {} bytes", app.config.limits.bytes))
+}
+
+/// Streams a body into a blob that is still to be finished.
+async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Problem> {
+    let mut writer = app.blobs.begin().await?;
+    let mut pieces = body.into_data_stream();
+    let mut length = 0;
+    loop {
+        let piece = match tokio::time::timeout(SILENCE, pieces.next()).await {
+            Ok(None) => break,
+            Ok(Some(Ok(piece))) => piece,
+            Ok(Some(Err(_))) => {
+                return Err(Problem::new(Kind::MalformedRequest, "The upload broke off before its end."));
+            }
+            Err(_) => {
+                let detail = format!("Nothing came for {} seconds in the middle of the upload.", SILENCE.as_secs());
+                return Err(Problem::new(Kind::RequestTimeout, detail));
+            }
+        };
+        length += piece.len() as u64;
+        if length > app.config.limits.bytes {
+            return Err(too_large(app));
+        }
+        writer.append(piece).await?;
+    }
+    if length == 0 {
+        return Err(Problem::new(Kind::UnusableMeasurement, "The body is empty.")
+            .accepting("a measured-paint package, an RGL .bsdf, an MPI 2005 table, a MERL binary or a .paint"));
+    }
+    Ok(writer)
+}
+
+/// The job: fits an upload and keeps the paint.
+pub(super) async fn ingest(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Problem> {
+    let id = &under_way.job().subject;
+    if app.catalogue.paint(id).await?.is_some() {
+        return Ok(Ok(()));
+    }
+    let IngestRequest { upload, order } = under_way.request()?;
+    let upload = upload.hash()?;
+    let local = app.blobs.local(upload).await?;
+    let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
+    let works = Arc::clone(&app.works);
+    let fitted = under_way.compute(app, "fitting", move |progress| {
+        let fitted = works.ingest(local.path(), &order, progress);
+        // The caller knows the upload, not the file it was kept in.
+        let folder = local.path().display().to_string();
+        fitted.map_err(|error| error.without(&folder))
+    });
+    let Ok(fitted) = fitted.await? else { return Ok(Err(CalledOff)) };
+    let file = fitted.map_err(|error| error.of_upload())?;
+    app.metrics.paints_fitted.increment(1);
+    under_way.stage("storing");
+    app.keep_paint(id, file, Some(upload)).await.map(Ok)
+}
+
+/// Lets go of the upload of a job that came to nothing.
+pub(super) async fn forget_upload(app: &App, job: &JobRecord) -> Result<(), Problem> {
+    let request: IngestRequest = serde_json::from_str(&job.request).map_err(Problem::internal)?;
+    app.forget_upload(request.upload.hash()?).await
+}
+
+/// List paints.
+#[utoipa::path(
+    get, path = "/v1/paints", tag = "paints", params(ListQuery),
+    responses(
+        (status = 200, description = "A page of paints", body = PaintList),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn list(State(app): State<App>, Query(query): Query<ListQuery>) -> Result<Answer, Problem> {
+    let cursor = query.cursor.as_deref().map(|cursor| i64::from_str_radix(cursor, 36)).transpose();
+    let cursor = cursor.map_err(|_| {
+        Problem::parameter("cursor", "The cursor was not made here.").accepting("`next` of the page before")
+    })?;
+    let limit = query.limit.unwrap_or(50);
+    if !(1..=LONGEST_PAGE).contains(&limit) {
+        return Err(Problem::parameter("limit", format!("limit is {limit}.")).accepting("1 to 200"));
+    }
+    let page = app.catalogue.paints(query.q.as_deref(), cursor, limit).await?;
+    let list = PaintList { paints: page.paints.into_iter().map(summary).collect(), next: page.next.map(base36) };
+    Ok(Answer::json(&list, Keep::Revalidated))
+}
+
+/// A cursor says nothing to who holds it.
+fn base36(mut number: i64) -> String {
+    let mut digits = Vec::new();
+    while number > 0 {
+        digits.push(char::from_digit(u32::try_from(number % 36).unwrap_or(0), 36).unwrap_or('0'));
+        number /= 36;
+    }
+    digits.iter().rev().collect()
+}
+
+fn summary(record: PaintRecord) -> PaintSummary {
+    PaintSummary {
+        href: format!("/v1/paints/{}", record.id),
+        id: record.id,
+        name: record.name,
+        source: record.source,
+        hash: record.content.to_string(),
+    }
+}
+
+/// What is known about a paint.
+///
+/// Provenance, parameters, fit residuals with their floor, energy certificate, flake statistics, warnings.
+#[utoipa::path(
+    get, path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    responses(
+        (status = 200, description = "The paint", body = PaintDocument),
+        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn show(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Answer, Problem> {
+    let paint = app.paint(&id).await?;
+    Ok(Answer::result("application/json", paint.document.clone(), Keep::Revalidated))
+}
+
+/// A paint as a `.paint` file.
+#[utoipa::path(
+    get, path = "/v1/paints/{id}/paint", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    responses(
+        (status = 200, description = "The file", body = Vec<u8>, content_type = "application/vnd.carpaint.paint"),
+        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn file(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Answer, Problem> {
+    let paint = app.paint(&id).await?;
+    let missing = || Problem::internal(format!("the file of {id} is not there"));
+    let blob = app.blobs.stream(paint.file).await?.ok_or_else(missing)?;
+    Ok(Answer::blob(Format::Paint.media_type(), paint.file, blob).saved_as(&format!("{id}.paint")))
+}
+
+/// The measurement a paint was made of: the very bytes that were uploaded.
+#[utoipa::path(
+    get, path = "/v1/paints/{id}/measurement", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    responses(
+        (status = 200, description = "The bytes", body = Vec<u8>, content_type = "application/octet-stream"),
+        (status = 404, description = "There is no such paint, or it had no measurement", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn measurement(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Answer, Problem> {
+    let paint = app.paint(&id).await?;
+    let none = || Problem::new(Kind::NoMeasurement, "This paint was not uploaded as a measurement.");
+    let upload = paint.measurement.ok_or_else(none)?;
+    let missing = || Problem::internal(format!("the measurement of {id} is not there"));
+    let blob = app.blobs.stream(upload).await?.ok_or_else(missing)?;
+    Ok(Answer::blob("application/octet-stream", upload, blob).saved_as(&format!("{id}.measurement")))
+}
+
+/// Delete a paint with its measurement. Blends that were made of it stay.
+#[utoipa::path(
+    delete, path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    responses(
+        (status = 204, description = "It is gone"),
+        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn delete(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<StatusCode, Problem> {
+    app.forget_paint(&id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Addresses of what can be made of a paint.
+pub(super) fn links(record: &PaintRecord) -> Value {
+    let base = format!("/v1/paints/{}", record.id);
+    let measurement = record.measurement.map(|_| format!("{base}/measurement"));
+    json!({
+        "links": {
+            "self": base,
+            "paint": format!("{base}/paint"),
+            "measurement": measurement,
+            "preview": format!("{base}/preview.png"),
+            "bundle": format!("{base}/realisation.zip"),
+            "glb": format!("{base}/realisation.glb"),
+        }
+    })
+}

@@ -1,0 +1,143 @@
+//! Previews: pictures of a paint, or of a blend at some weights.
+
+use std::str::FromStr;
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::extract::State;
+use serde::{Deserialize, Deserializer};
+use utoipa::IntoParams;
+
+use super::answer::{Answer, Keep};
+use super::app::{App, Shelved};
+use super::extract::{Address, Query, QueryOfTwo};
+use super::ids;
+use super::problem::{Problem, ProblemDocument};
+use super::weights::WeightQuery;
+use super::works::{Accuracy, PictureFormat, Preset, Scene, View};
+use crate::blend::RealisationWeights;
+
+/// Longest side of a picture.
+const LONGEST_SIDE: u32 = 4096;
+
+/// Most samples of one picture: pixels times samples per pixel.
+const MOST_SAMPLES: u64 = 1 << 30;
+
+/// What a picture shows.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ViewQuery {
+    /// What the paint is on, `sphere` unless given.
+    scene: Option<Scene>,
+    /// Width and height in pixels, `512x512` unless given.
+    #[param(value_type = Option<String>, pattern = "^[0-9]{1,4}x[0-9]{1,4}$", example = "512x512")]
+    size: Option<Size>,
+    /// Samples per pixel, in place of the profile's.
+    #[param(minimum = 1, maximum = 4096)]
+    spp: Option<u32>,
+    /// Accuracy.
+    profile: Option<Preset>,
+}
+
+/// `WxH` in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Size([u32; 2]);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let side = |side: &str| side.parse().ok().filter(|pixels| (1..=LONGEST_SIDE).contains(pixels));
+        text.split_once('x')
+            .and_then(|(width, height)| Some(Self([side(width)?, side(height)?])))
+            .ok_or_else(|| format!("{text:?} is no size; accepted is WxH such as 512x512, up to {LONGEST_SIDE} each."))
+    }
+}
+
+impl<'de> Deserialize<'de> for Size {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+impl ViewQuery {
+    fn view(&self, app: &App) -> Result<View, Problem> {
+        let Size(size) = self.size.unwrap_or(Size([512, 512]));
+        let most = app.config.limits.samples;
+        if let Some(spp) = self.spp
+            && !(1..=most).contains(&spp)
+        {
+            return Err(Problem::parameter("spp", format!("spp is {spp}.")).accepting(format!("1 to {most}")));
+        }
+        let samples = u64::from(size[0]) * u64::from(size[1]) * u64::from(self.spp.unwrap_or(1));
+        if samples > MOST_SAMPLES {
+            let detail = format!("{} x {} pixels with this many samples each is too much.", size[0], size[1]);
+            return Err(Problem::parameter("spp", detail).accepting(format!("up to {MOST_SAMPLES} samples in all")));
+        }
+        Ok(View { scene: self.scene.unwrap_or_default(), size, samples_per_pixel: self.spp })
+    }
+}
+
+/// A picture of a blend at some weights.
+#[utoipa::path(
+    get, path = "/v1/blends/{id}/preview.{format}", tag = "previews",
+    params(("id" = String, Path, description = "Blend"), ("format" = PictureFormat, Path, description = "Picture"), WeightQuery, ViewQuery),
+    responses(
+        (status = 200, description = "The picture", content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
+        (status = 400, description = "Weights that do not fit the blend, or a view that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn of_blend(
+    State(app): State<App>,
+    Address((id, format)): Address<(String, PictureFormat)>,
+    QueryOfTwo(weights, query): QueryOfTwo<WeightQuery, ViewQuery>,
+) -> Result<Answer, Problem> {
+    let blend = app.blend(&id).await?;
+    let weights = weights.for_blend(&blend.names)?;
+    draw(&app, blend, Some(weights), format, &query).await
+}
+
+/// A picture of a paint.
+#[utoipa::path(
+    get, path = "/v1/paints/{id}/preview.{format}", tag = "previews",
+    params(("id" = String, Path, description = "Paint"), ("format" = PictureFormat, Path, description = "Picture"), ViewQuery),
+    responses(
+        (status = 200, description = "The picture", content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
+        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn of_paint(
+    State(app): State<App>,
+    Address((id, format)): Address<(String, PictureFormat)>,
+    Query(query): Query<ViewQuery>,
+) -> Result<Answer, Problem> {
+    let paint = app.paint(&id).await?;
+    draw(&app, paint, None, format, &query).await
+}
+
+async fn draw(
+    app: &App,
+    thing: Arc<Shelved>,
+    weights: Option<RealisationWeights>,
+    format: PictureFormat,
+    query: &ViewQuery,
+) -> Result<Answer, Problem> {
+    let begun = Instant::now();
+    let view = query.view(app)?;
+    let accuracy = Accuracy { profile: query.profile.unwrap_or_default(), clusters: None };
+    let key = ids::key("preview", &(&thing.id, thing.file.to_string(), &weights, view, format, accuracy));
+    let on = app.clone();
+    let compute = move || async move {
+        let (works, counter) = (Arc::clone(&on.works), on.metrics.previews_rendered.clone());
+        let drawn =
+            on.bench.run(move || works.preview(&thing.thing, weights.as_ref(), &view, format, accuracy)).await?;
+        let bytes = drawn.map_err(|error| error.of_query())?;
+        counter.increment(1);
+        Ok(bytes.into())
+    };
+    let result = app.results.get_or_compute(key, compute).await?;
+    Ok(Answer::result(format.media_type(), result, Keep::ForEver).stage("preview", begun.elapsed()))
+}

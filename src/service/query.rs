@@ -1,0 +1,315 @@
+//! Queries: strict reading of `?a=1&b=2` into the fields of a struct.
+//!
+//! Unknown and repeated parameters are refused, so that a typing error is not an answer to another question. Numbers are
+//! finite, lists are separated by commas.
+
+use std::cell::Cell;
+use std::fmt::{self, Display};
+
+use serde::de::value::{MapDeserializer, SeqDeserializer, StrDeserializer};
+use serde::de::{self, DeserializeOwned, IntoDeserializer, Visitor};
+use serde::forward_to_deserialize_any;
+
+use super::problem::{Kind, Problem};
+
+/// A parameter as it stands in the address, decoded.
+pub type Pair = (String, String);
+
+/// What a field of a struct made of the query refuses.
+#[derive(Debug)]
+struct Refusal {
+    name: Option<String>,
+    message: String,
+    accepted: Option<String>,
+}
+
+impl Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+impl de::Error for Refusal {
+    fn custom<T: Display>(message: T) -> Self {
+        Self { name: None, message: message.to_string(), accepted: None }
+    }
+
+    fn missing_field(field: &'static str) -> Self {
+        Self { name: Some(field.to_owned()), message: format!("The parameter {field} is missing."), accepted: None }
+    }
+
+    fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
+        let message = format!("{variant:?} is not offered.");
+        Self { name: None, message, accepted: Some(expected.join(", ")) }
+    }
+}
+
+impl Refusal {
+    fn of(self, name: &str) -> Self {
+        Self { name: Some(self.name.unwrap_or_else(|| name.to_owned())), ..self }
+    }
+
+    fn problem(self) -> Problem {
+        let problem = match &self.name {
+            Some(name) => Problem::parameter(name, self.message),
+            None => Problem::new(Kind::InvalidParameter, self.message),
+        };
+        match self.accepted {
+            Some(accepted) => problem.accepting(accepted),
+            None => problem,
+        }
+    }
+}
+
+/// Splits and decodes a query. Repeated parameters are refused.
+pub fn pairs(query: &str) -> Result<Vec<Pair>, Problem> {
+    let mut pairs: Vec<Pair> = Vec::new();
+    for part in query.split('&').filter(|part| !part.is_empty()) {
+        let (name, value) = part.split_once('=').unwrap_or((part, ""));
+        let (name, value) = (decode(name)?, decode(value)?);
+        if pairs.iter().any(|(other, _)| *other == name) {
+            return Err(Problem::parameter(&name, format!("The parameter {name} stands twice in the query."))
+                .accepting("each parameter once"));
+        }
+        pairs.push((name, value));
+    }
+    Ok(pairs)
+}
+
+fn decode(text: &str) -> Result<String, Problem> {
+    let broken =
+        || Problem::new(Kind::MalformedRequest, format!("{text:?} in the query is not percent-encoded UTF-8."));
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.bytes();
+    while let Some(byte) = rest.next() {
+        bytes.push(match byte {
+            b'+' => b' ',
+            b'%' => {
+                let mut digit = || rest.next().and_then(|digit| char::from(digit).to_digit(16));
+                let (high, low) = (digit().ok_or_else(broken)?, digit().ok_or_else(broken)?);
+                u8::try_from(high * 16 + low).map_err(|_| broken())?
+            }
+            byte => byte,
+        });
+    }
+    String::from_utf8(bytes).map_err(|_| broken())
+}
+
+/// Refuses parameters whose names are none of these.
+pub fn refuse_unknown(pairs: &[Pair], known: &[&str]) -> Result<(), Problem> {
+    let Some((name, _)) = pairs.iter().find(|(name, _)| !known.contains(&name.as_str())) else { return Ok(()) };
+    let problem = Problem::parameter(name, format!("There is no parameter {name:?} here."));
+    Err(problem.accepting(if known.is_empty() { "no parameters".to_owned() } else { known.join(", ") }))
+}
+
+/// Reads the parameters that `T` has; others are left to others.
+pub fn read<T: DeserializeOwned>(pairs: &[Pair]) -> Result<T, Problem> {
+    let names = names::<T>();
+    let own = pairs
+        .iter()
+        .filter(|(name, _)| names.contains(&name.as_str()))
+        .map(|(name, text)| (name.as_str(), Text { name, text }));
+    T::deserialize(MapDeserializer::new(own)).map_err(Refusal::problem)
+}
+
+/// Names of the fields of a struct, as serde knows them.
+pub fn names<T: DeserializeOwned>() -> &'static [&'static str] {
+    let names = Cell::new(&[][..]);
+    // Asks the struct what it would read, and reads nothing.
+    let _ = T::deserialize(Asking(&names));
+    names.get()
+}
+
+struct Asking<'a>(&'a Cell<&'static [&'static str]>);
+
+impl<'de> de::Deserializer<'de> for Asking<'_> {
+    type Error = Refusal;
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        fields: &'static [&'static str],
+        _: V,
+    ) -> Result<V::Value, Refusal> {
+        self.0.set(fields);
+        Err(de::Error::custom("only asked"))
+    }
+
+    fn deserialize_any<V: Visitor<'de>>(self, _: V) -> Result<V::Value, Refusal> {
+        Err(de::Error::custom("only asked"))
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 u8 u16 u32 u64 f32 f64 char str string bytes byte_buf option unit unit_struct
+        newtype_struct seq tuple tuple_struct map enum identifier ignored_any
+    }
+}
+
+/// The value of one parameter.
+#[derive(Clone, Copy)]
+struct Text<'a> {
+    name: &'a str,
+    text: &'a str,
+}
+
+impl<'de> IntoDeserializer<'de, Refusal> for Text<'_> {
+    type Deserializer = Self;
+
+    fn into_deserializer(self) -> Self {
+        self
+    }
+}
+
+impl Text<'_> {
+    fn refuse(&self, accepted: &str) -> Refusal {
+        let message = format!("{} is {:?}.", self.name, self.text);
+        Refusal { name: Some(self.name.to_owned()), message, accepted: Some(accepted.to_owned()) }
+    }
+
+    fn number<T: std::str::FromStr>(&self, accepted: &str) -> Result<T, Refusal> {
+        self.text.trim().parse().map_err(|_| self.refuse(accepted))
+    }
+}
+
+macro_rules! whole_numbers {
+    ($($method:ident $visit:ident)*) => {$(
+        fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
+            visitor.$visit(self.number("a whole number in range")?).map_err(|error: Refusal| error.of(self.name))
+        }
+    )*};
+}
+
+impl<'de> de::Deserializer<'de> for Text<'_> {
+    type Error = Refusal;
+
+    whole_numbers! {
+        deserialize_u8 visit_u8 deserialize_u16 visit_u16 deserialize_u32 visit_u32 deserialize_u64 visit_u64
+        deserialize_i8 visit_i8 deserialize_i16 visit_i16 deserialize_i32 visit_i32 deserialize_i64 visit_i64
+    }
+
+    fn deserialize_f32<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
+        self.deserialize_f64(visitor)
+    }
+
+    fn deserialize_f64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
+        let value: f64 = self.number("a finite number")?;
+        if !value.is_finite() {
+            return Err(self.refuse("a finite number"));
+        }
+        visitor.visit_f64(value).map_err(|error: Refusal| error.of(self.name))
+    }
+
+    fn deserialize_bool<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
+        match self.text {
+            "true" => visitor.visit_bool(true),
+            "false" => visitor.visit_bool(false),
+            _ => Err(self.refuse("true or false")),
+        }
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Refusal> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
+        let parts = self.text.split(',').map(|text| Text { name: self.name, text });
+        visitor.visit_seq(SeqDeserializer::new(parts)).map_err(|error: Refusal| error.of(self.name))
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Refusal> {
+        let variant: StrDeserializer<'_, Refusal> = self.text.into_deserializer();
+        visitor.visit_enum(variant).map_err(|error: Refusal| error.of(self.name))
+    }
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
+        visitor.visit_str(self.text).map_err(|error: Refusal| error.of(self.name))
+    }
+
+    forward_to_deserialize_any! {
+        char str string bytes byte_buf unit unit_struct tuple tuple_struct map struct identifier ignored_any
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize, PartialEq)]
+    #[serde(rename_all = "kebab-case")]
+    enum Scene {
+        Sphere,
+        FlatPanel,
+    }
+
+    #[derive(Debug, Deserialize, PartialEq)]
+    struct Asked {
+        weights: Option<Vec<f64>>,
+        scene: Option<Scene>,
+        spp: Option<u32>,
+        name: Option<String>,
+    }
+
+    fn ask(query: &str) -> Result<Asked, serde_json::Value> {
+        let read = || {
+            let pairs = pairs(query)?;
+            refuse_unknown(&pairs, names::<Asked>())?;
+            read(&pairs)
+        };
+        read().map_err(|problem| serde_json::to_value(problem.document(None)).expect("serialises"))
+    }
+
+    #[test]
+    fn a_query_becomes_a_struct() {
+        let asked = ask("weights=-2,3e0&scene=flat-panel&name=m%C3%A9tal+blue&spp=16").expect("is accepted");
+        let name = Some("métal blue".to_owned());
+        assert_eq!(asked, Asked { weights: Some(vec![-2.0, 3.0]), scene: Some(Scene::FlatPanel), spp: Some(16), name });
+        assert_eq!(ask("").expect("all are optional").weights, None);
+    }
+
+    #[test]
+    fn what_is_not_accepted_is_named() {
+        let cases = [
+            ("weights=0.5,nan", "/weights", "a finite number"),
+            ("weights=", "/weights", "a finite number"),
+            ("scene=cube", "/scene", "sphere, flat-panel"),
+            ("spp=-1", "/spp", "a whole number in range"),
+            ("surprise=1", "/surprise", "weights, scene, spp, name"),
+            ("spp=1&spp=2", "/spp", "each parameter once"),
+        ];
+        for (query, pointer, accepted) in cases {
+            let problem = ask(query).expect_err(query);
+            assert_eq!(problem["pointer"], pointer, "{query}: {problem}");
+            assert_eq!(problem["accepted"], accepted, "{query}: {problem}");
+            assert_eq!(problem["in"], "query");
+        }
+        for query in ["name=%", "name=%4", "name=%zz", "name=%ff"] {
+            assert_eq!(ask(query).expect_err(query)["status"], 400);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_query_is_read_or_refused(query in "\\PC{0,40}") {
+            let _ = ask(&query);
+        }
+
+        #[test]
+        fn numbers_arrive_as_they_were_sent(w in proptest::collection::vec(-1e12..1e12_f64, 1..6)) {
+            let text = w.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+            prop_assert_eq!(ask(&format!("weights={text}")).expect("is accepted").weights, Some(w));
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! Realisations: a paint, or a blend at some weights, as a file that others use.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::extract::State;
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use super::answer::{Answer, Keep};
+use super::app::{App, Shelved};
+use super::extract::{Address, Query, QueryOfTwo};
+use super::ids;
+use super::problem::{Problem, ProblemDocument};
+use super::weights::WeightQuery;
+use super::works::{Accuracy, Format, Preset};
+use crate::blend::RealisationWeights;
+
+/// How accurately a file is written.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ProfileQuery {
+    /// Accuracy.
+    profile: Option<Preset>,
+}
+
+/// A blend at some weights, as a file.
+///
+/// `zip` is the texture bundle with its shader, `glb` a glTF binary, `json` the bundle's `material.json` with the
+/// textures inline, `paint` a paint that can be blended again.
+#[utoipa::path(
+    get, path = "/v1/blends/{id}/realisation.{format}", tag = "realisations",
+    params(("id" = String, Path, description = "Blend"), ("format" = Format, Path, description = "File"), WeightQuery, ProfileQuery),
+    responses(
+        (status = 200, description = "The file", content(
+            (Vec<u8> = "application/zip"), (Vec<u8> = "model/gltf-binary"), (serde_json::Value = "application/json"),
+            (Vec<u8> = "application/vnd.carpaint.paint"))),
+        (status = 400, description = "Weights that do not fit the blend", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn of_blend(
+    State(app): State<App>,
+    Address((id, format)): Address<(String, Format)>,
+    QueryOfTwo(weights, query): QueryOfTwo<WeightQuery, ProfileQuery>,
+) -> Result<Answer, Problem> {
+    let blend = app.blend(&id).await?;
+    let weights = weights.for_blend(&blend.names)?;
+    realise(&app, blend, Some(weights), format, query).await
+}
+
+/// A paint as a file.
+#[utoipa::path(
+    get, path = "/v1/paints/{id}/realisation.{format}", tag = "realisations",
+    params(("id" = String, Path, description = "Paint"), ("format" = Format, Path, description = "File"), ProfileQuery),
+    responses(
+        (status = 200, description = "The file", content(
+            (Vec<u8> = "application/zip"), (Vec<u8> = "model/gltf-binary"), (serde_json::Value = "application/json"),
+            (Vec<u8> = "application/vnd.carpaint.paint"))),
+        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn of_paint(
+    State(app): State<App>,
+    Address((id, format)): Address<(String, Format)>,
+    Query(query): Query<ProfileQuery>,
+) -> Result<Answer, Problem> {
+    let paint = app.paint(&id).await?;
+    realise(&app, paint, None, format, query).await
+}
+
+async fn realise(
+    app: &App,
+    thing: Arc<Shelved>,
+    weights: Option<RealisationWeights>,
+    format: Format,
+    query: ProfileQuery,
+) -> Result<Answer, Problem> {
+    let begun = Instant::now();
+    let accuracy = Accuracy { profile: query.profile.unwrap_or_default(), clusters: None };
+    let key = ids::key("realisation", &(&thing.id, thing.file.to_string(), &weights, format, accuracy));
+    let name = format!("{}.{}", thing.id, format.ending());
+    let on = app.clone();
+    let compute = move || async move {
+        let (works, counter) = (Arc::clone(&on.works), on.metrics.realisations_computed.clone());
+        let made = on.bench.run(move || works.realise(&thing.thing, weights.as_ref(), format, accuracy)).await?;
+        let bytes = made.map_err(|error| error.of_query())?;
+        counter.increment(1);
+        Ok(bytes.into())
+    };
+    let result = app.results.get_or_compute(key, compute).await?;
+    let answer = Answer::result(format.media_type(), result, Keep::ForEver).saved_as(&name);
+    Ok(answer.stage("realisation", begun.elapsed()))
+}

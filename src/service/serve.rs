@@ -1,0 +1,142 @@
+//! Listening: addresses and their handlers, connections with time limits, and a quiet end.
+
+use std::io;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::DefaultBodyLimit;
+use axum::routing::get;
+use axum::{Router, middleware};
+use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
+use hyper_util::server::conn::auto::Builder;
+use hyper_util::server::graceful::GracefulShutdown;
+use hyper_util::service::TowerToHyperService;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+
+use super::app::App;
+use super::envelope::envelope;
+use super::extract::JSON_BYTES;
+use super::works::Works;
+use super::{ServiceConfig, blends, docs, home, jobs, operations, paints, previews, realisations, runner};
+use crate::store::StoreError;
+
+/// Why a service did not start, or did not go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ServeError {
+    /// The store.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The jobs that were under way could not be read.
+    #[error("the jobs on record could not be begun again")]
+    Jobs,
+    /// The address.
+    #[error("cannot listen on {address}: {source}")]
+    Listen {
+        /// Where it should have listened.
+        address: std::net::SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// Opens the store and begins again what was under way. The service is ready once [`App::set_ready`] was called.
+///
+/// # Errors
+///
+/// [`ServeError`] when the data folder is in use, full, or not this program's.
+pub async fn open(config: ServiceConfig, works: Arc<dyn Works>) -> Result<App, ServeError> {
+    let app = App::open(config, works).await?;
+    runner::resume(&app).await.map_err(|_| ServeError::Jobs)?;
+    Ok(app)
+}
+
+/// All addresses.
+#[must_use]
+pub fn router(app: App) -> Router {
+    Router::new()
+        .route("/v1/paints", get(paints::list).post(paints::upload))
+        .route("/v1/paints/{id}", get(paints::show).delete(paints::delete))
+        .route("/v1/paints/{id}/paint", get(paints::file))
+        .route("/v1/paints/{id}/measurement", get(paints::measurement))
+        .route("/v1/paints/{id}/realisation.{format}", get(realisations::of_paint))
+        .route("/v1/paints/{id}/preview.{format}", get(previews::of_paint))
+        .route("/v1/blends", axum::routing::post(blends::create))
+        .route("/v1/blends/{id}", get(blends::show))
+        .route("/v1/blends/{id}/realisation.{format}", get(realisations::of_blend))
+        .route("/v1/blends/{id}/preview.{format}", get(previews::of_blend))
+        .route("/v1/jobs/{id}", get(jobs::show).delete(jobs::cancel))
+        .route("/v1/jobs/{id}/events", get(jobs::events))
+        .route("/healthz", get(operations::healthz))
+        .route("/readyz", get(operations::readyz))
+        .route("/metrics", get(operations::metrics))
+        .route("/", get(home::page))
+        .route("/studio/page.js", get(home::script))
+        .route("/studio/page.css", get(home::style))
+        .route("/docs", get(docs::page))
+        .route("/docs/page.js", get(docs::script))
+        .route("/docs/page.css", get(docs::style))
+        .route("/openapi.json", get(docs::openapi))
+        .route("/problems/{kind}", get(docs::problem))
+        .fallback(|| async { axum::http::StatusCode::NOT_FOUND })
+        // Uploads hold themselves to their own limit, piece by piece.
+        .layer(DefaultBodyLimit::max(JSON_BYTES))
+        .layer(middleware::from_fn_with_state(app.clone(), envelope))
+        .with_state(app)
+}
+
+/// Serves until `stop` returns, then ends: no new connections, requests under way are answered, jobs stay on record.
+pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = ()>) {
+    let router = router(app.clone());
+    let connections = Arc::new(Semaphore::new(app.config.most_connections));
+    let graceful = GracefulShutdown::new();
+    let mut builder = Builder::new(TokioExecutor::new());
+    builder.http1().timer(TokioTimer::new()).header_read_timeout(app.config.header_time);
+
+    let mut stop = std::pin::pin!(stop);
+    loop {
+        let room = tokio::select! {
+            room = Arc::clone(&connections).acquire_owned() => room,
+            () = &mut stop => break,
+        };
+        let stream = tokio::select! {
+            stream = accept(&listener) => stream,
+            () = &mut stop => break,
+        };
+        let connection = builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router.clone()));
+        let connection = graceful.watch(connection.into_owned());
+        tokio::spawn(async move {
+            // How a connection ends is the caller's business.
+            let _ = connection.await;
+            drop(room);
+        });
+    }
+    drop(listener);
+    app.stop();
+    let grace = app.config.grace;
+    let _ = tokio::time::timeout(grace, async {
+        graceful.shutdown().await;
+        while !app.jobs.is_idle() {
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    })
+    .await;
+}
+
+/// The next connection. Where the system has none to give it is asked again a little later.
+async fn accept(listener: &TcpListener) -> TcpStream {
+    loop {
+        match listener.accept().await {
+            Ok((stream, _)) => {
+                // Small answers go out at once.
+                let _ = stream.set_nodelay(true);
+                return stream;
+            }
+            Err(error) => {
+                tracing::warn!(%error, "no connection was accepted");
+                tokio::time::sleep(Duration::from_millis(50)).await;
+            }
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! What the service asks of the workshop: four pieces of work, synchronous and computing.
+
+use std::fmt::Debug;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use crate::blend::{Blend, RealisationWeights};
+use crate::paint::PaintFile;
+
+/// Share done, from 0 to 1. It does not return when the work was called off.
+pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
+
+pub use crate::workshop::Thing;
+
+/// Named accuracy presets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Preset {
+    /// Fast: few clusters, greedy correspondence, few samples.
+    Draft,
+    /// 50 clusters a slice, exact transport.
+    #[default]
+    Standard,
+    /// What the others are measured against.
+    Reference,
+}
+
+/// How accurate, which is how slow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Accuracy {
+    /// Preset.
+    pub profile: Preset,
+    /// Clusters per slice, in place of the preset's.
+    pub clusters: Option<u32>,
+}
+
+/// What a measurement file is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// MPI 2005 table.
+    #[serde(rename = "mpi-2005")]
+    Mpi2005,
+    /// MERL binary.
+    Merl,
+    /// RGL tensor file.
+    Rgl,
+    /// Measured-paint package.
+    Package,
+}
+
+/// How θh is spaced in an MPI 2005 table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ThetaH {
+    /// Evenly.
+    Linear,
+    /// Densely near the normal.
+    Sqrt,
+}
+
+/// How an upload becomes a paint.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct IngestOrder {
+    /// Name of the paint, in place of the measurement's own.
+    pub name: Option<String>,
+    /// What the file is, where its bytes do not say.
+    pub layout: Option<Layout>,
+    /// Spacing of θh.
+    pub theta_h: Option<ThetaH>,
+    /// Bytes before the values of an MPI 2005 table.
+    pub header_bytes: Option<u64>,
+    /// Index of refraction of the coat, where the caller knows it.
+    pub coat_ior: Option<f64>,
+    /// Accuracy.
+    pub accuracy: Accuracy,
+}
+
+/// What a realisation is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Format {
+    /// Texture bundle.
+    Zip,
+    /// glTF binary.
+    Glb,
+    /// `material.json` with the textures inline.
+    Json,
+    /// A `.paint`, which can be blended again.
+    Paint,
+}
+
+/// What a picture is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PictureFormat {
+    /// Tone mapped for a screen, 8 bits.
+    Png,
+    /// Linear light.
+    Exr,
+}
+
+/// What the paint is on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scene {
+    /// A ball.
+    #[default]
+    Sphere,
+    /// A capsule.
+    Capsule,
+    /// A flat panel.
+    Panel,
+}
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct View {
+    /// What the paint is on.
+    pub scene: Scene,
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Samples per pixel, in place of the profile's.
+    pub samples_per_pixel: Option<u32>,
+}
+
+/// Whose fault it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The request asks for something that is not offered or does not fit together.
+    Request,
+    /// The upload is not what it should be.
+    Upload,
+    /// A bug, or a machine that fails us.
+    Internal,
+}
+
+/// Work that failed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct WorkError {
+    /// Whose fault it is.
+    pub fault: Fault,
+    /// The field that is wrong, where one can be named.
+    pub field: Option<String>,
+    /// What is wrong, with the value and what would be accepted.
+    pub message: String,
+}
+
+/// The pieces of work.
+pub trait Works: Debug + Send + Sync {
+    /// An upload becomes a paint.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for an upload that is no measurement.
+    fn ingest(&self, upload: &Path, order: &IngestOrder, progress: Progress<'_>) -> Result<PaintFile, WorkError>;
+
+    /// Paints become a blend.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for paints that cannot be blended.
+    fn blend(&self, paints: &[&PaintFile], accuracy: Accuracy, progress: Progress<'_>) -> Result<Blend, WorkError>;
+
+    /// A paint, or a blend at some weights, becomes a file.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for weights that are refused.
+    fn realise(
+        &self,
+        thing: &Thing,
+        weights: Option<&RealisationWeights>,
+        format: Format,
+        accuracy: Accuracy,
+    ) -> Result<Vec<u8>, WorkError>;
+
+    /// A paint, or a blend at some weights, becomes a picture.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for weights or a view that is refused.
+    fn preview(
+        &self,
+        thing: &Thing,
+        weights: Option<&RealisationWeights>,
+        view: &View,
+        format: PictureFormat,
+        accuracy: Accuracy,
+    ) -> Result<Vec<u8>, WorkError>;
+
+    /// What is known about a paint or a blend.
+    fn describe(&self, thing: &Thing) -> Value;
+}
+
+impl Format {
+    /// Media type of the file.
+    #[must_use]
+    pub const fn media_type(self) -> &'static str {
+        match self {
+            Self::Zip => "application/zip",
+            Self::Glb => "model/gltf-binary",
+            Self::Json => "application/json",
+            Self::Paint => "application/vnd.carpaint.paint",
+        }
+    }
+
+    /// Ending of the file's name.
+    #[must_use]
+    pub const fn ending(self) -> &'static str {
+        match self {
+            Self::Zip => "zip",
+            Self::Glb => "glb",
+            Self::Json => "json",
+            Self::Paint => "paint",
+        }
+    }
+}
+
+impl PictureFormat {
+    /// Media type of the file.
+    #[must_use]
+    pub const fn media_type(self) -> &'static str {
+        match self {
+            Self::Png => "image/png",
+            Self::Exr => "image/x-exr",
+        }
+    }
+
+    /// Ending of the file's name.
+    #[must_use]
+    pub const fn ending(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Exr => "exr",
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! The workshop behind the service's desk: each piece of work is the use case that the command line calls too.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::works::{
+    Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH, Thing, View, WorkError,
+    Works,
+};
+use crate::accuracy::Profile;
+use crate::blend::{Blend, RealisationWeights};
+use crate::measurement::{self, ReadOptions, ThetaHSpacing};
+use crate::paint::{Limits, PaintFile};
+use crate::workshop::{self, IngestOptions, PreviewOptions, WorkshopError};
+
+/// Does the work, within limits.
+#[derive(Clone, Copy, Debug)]
+pub struct Workshop {
+    limits: Limits,
+}
+
+impl Workshop {
+    /// A workshop that keeps to these limits.
+    #[must_use]
+    pub const fn new(limits: Limits) -> Self {
+        Self { limits }
+    }
+}
+
+impl From<WorkshopError> for WorkError {
+    fn from(error: WorkshopError) -> Self {
+        let fault = match error.fault {
+            workshop::Fault::Usage => Fault::Request,
+            workshop::Fault::Input => Fault::Upload,
+            workshop::Fault::Output | workshop::Fault::Internal => Fault::Internal,
+        };
+        Self { fault, field: error.field, message: error.message }
+    }
+}
+
+fn profile(accuracy: Accuracy) -> Result<Profile, WorkshopError> {
+    let preset = match accuracy.profile {
+        Preset::Draft => Profile::draft(),
+        Preset::Standard => Profile::standard(),
+        Preset::Reference => Profile::reference(),
+    };
+    match accuracy.clusters {
+        None => Ok(preset),
+        Some(clusters) => {
+            preset.with_clusters(clusters as usize).map_err(|error| WorkshopError::usage("clusters", error))
+        }
+    }
+}
+
+impl Works for Workshop {
+    fn ingest(&self, upload: &Path, order: &IngestOrder, progress: Progress<'_>) -> Result<PaintFile, WorkError> {
+        let layout = order.layout.map(|layout| match layout {
+            Layout::Mpi2005 => measurement::Layout::Mpi2005,
+            Layout::Merl => measurement::Layout::Merl,
+            Layout::Rgl => measurement::Layout::Rgl,
+            Layout::Package => measurement::Layout::Package,
+        });
+        let theta_h = order.theta_h.map(|spacing| match spacing {
+            ThetaH::Linear => ThetaHSpacing::Linear,
+            ThetaH::Sqrt => ThetaHSpacing::SquareRoot,
+        });
+        let options = IngestOptions {
+            name: order.name.clone(),
+            read: ReadOptions { layout, theta_h, header_bytes: order.header_bytes },
+            coat_ior: order.coat_ior,
+            clusters: order.accuracy.clusters.map(|n| n as usize),
+            profile: profile(order.accuracy)?,
+            limits: self.limits,
+        };
+        Ok(workshop::ingest_upload(upload, &options, progress)?)
+    }
+
+    fn blend(&self, paints: &[&PaintFile], accuracy: Accuracy, progress: Progress<'_>) -> Result<Blend, WorkError> {
+        Ok(workshop::blend_paints(paints, &profile(accuracy)?, progress)?.blend)
+    }
+
+    fn realise(
+        &self,
+        thing: &Thing,
+        weights: Option<&RealisationWeights>,
+        format: Format,
+        accuracy: Accuracy,
+    ) -> Result<Vec<u8>, WorkError> {
+        let format = match format {
+            Format::Zip => workshop::Format::Zip,
+            Format::Glb => workshop::Format::Glb,
+            Format::Json => workshop::Format::Json,
+            Format::Paint => workshop::Format::Paint,
+        };
+        Ok(workshop::realise(thing, weights, format, &profile(accuracy)?)?.bytes)
+    }
+
+    fn preview(
+        &self,
+        thing: &Thing,
+        weights: Option<&RealisationWeights>,
+        view: &View,
+        format: PictureFormat,
+        accuracy: Accuracy,
+    ) -> Result<Vec<u8>, WorkError> {
+        let scene = match view.scene {
+            Scene::Sphere => "sphere",
+            Scene::Capsule => "capsule",
+            Scene::Panel => "panel",
+        };
+        let options = PreviewOptions {
+            scene: scene.to_owned(),
+            size: view.size,
+            samples_per_pixel: view.samples_per_pixel.unwrap_or(profile(accuracy)?.samples_per_pixel),
+            environment: None,
+        };
+        let format = match format {
+            PictureFormat::Png => workshop::PictureFormat::Png,
+            PictureFormat::Exr => workshop::PictureFormat::Exr,
+        };
+        Ok(workshop::preview(thing, weights, &options, format, &self.limits, &|_| ())?.bytes)
+    }
+
+    fn describe(&self, thing: &Thing) -> Value {
+        match thing {
+            Thing::Paint(paint) => workshop::describe_paint(paint),
+            Thing::Blend(blend) => workshop::describe_blend(blend),
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! The catalogue: which paints and blends there are, and which jobs are to be done.
+//!
+//! Records are names, hashes and opaque JSON. Three small traits, one per resource; [`Catalogue`] is all of them.
+
+use serde::{Deserialize, Serialize};
+
+use super::blobs::{Hash, Task};
+
+/// A paint that was ingested or given as a sample.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PaintRecord {
+    /// Address.
+    pub id: String,
+    /// Name, as people search for it.
+    pub name: String,
+    /// Kind of source, as the provenance has it.
+    pub source: String,
+    /// Blob of the measurement, where there was one.
+    pub measurement: Option<Hash>,
+    /// Blob of the `.paint` file.
+    pub paint: Hash,
+    /// Hash of the physical content: equal for equal paints of different names.
+    pub content: Hash,
+}
+
+/// A page of paints, in the order they came.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PaintPage {
+    /// The paints.
+    pub paints: Vec<PaintRecord>,
+    /// Where the next page begins; `None` after the last.
+    pub next: Option<i64>,
+}
+
+/// A blend that was computed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BlendRecord {
+    /// Address.
+    pub id: String,
+    /// Ids of its paints, in the order they were asked for.
+    pub paints: Vec<String>,
+    /// What else was asked for: a JSON object.
+    pub options: String,
+    /// Blob of the `.blend` file.
+    pub blend: Hash,
+}
+
+/// What a job makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JobKind {
+    /// A paint from an upload.
+    Ingest,
+    /// A blend of paints.
+    Blend,
+}
+
+/// How far a job is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JobState {
+    /// Waits for its turn.
+    Queued,
+    /// Is being worked on.
+    Running,
+    /// Its result exists.
+    Done,
+    /// It could not be done.
+    Failed,
+    /// Somebody called it off.
+    Cancelled,
+}
+
+/// A job to be recorded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NewJob {
+    /// Address, not used before.
+    pub id: String,
+    /// What it makes.
+    pub kind: JobKind,
+    /// Id of the paint or blend that it makes.
+    pub subject: String,
+    /// Everything needed to do it, again if need be: a JSON object.
+    pub request: String,
+}
+
+/// A job on record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JobRecord {
+    /// Address.
+    pub id: String,
+    /// What it makes.
+    pub kind: JobKind,
+    /// Id of the paint or blend that it makes.
+    pub subject: String,
+    /// Everything needed to do it.
+    pub request: String,
+    /// How far it is.
+    pub state: JobState,
+    /// How often it was begun.
+    pub attempts: u32,
+    /// Why it failed: a JSON object.
+    pub problem: Option<String>,
+}
+
+/// What came of submitting a job.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Submitted {
+    /// The one unfinished job of the subject.
+    pub job: JobRecord,
+    /// Whether this call made it.
+    pub new: bool,
+}
+
+/// Paints on record.
+pub trait Paints: Send + Sync {
+    /// Adds a paint; `false` when its id is there already, which changes nothing.
+    fn add_paint<'a>(&'a self, paint: &'a PaintRecord) -> Task<'a, bool>;
+
+    /// The paint of this id.
+    fn paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>>;
+
+    /// Up to `limit` paints whose name or source contains `q`, whatever the case, from `cursor` on.
+    fn paints<'a>(&'a self, q: Option<&'a str>, cursor: Option<i64>, limit: u32) -> Task<'a, PaintPage>;
+
+    /// Removes a paint and hands out what was on record.
+    fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>>;
+}
+
+/// Blends on record.
+pub trait Blends: Send + Sync {
+    /// Adds a blend; `false` when its id is there already, which changes nothing.
+    fn add_blend<'a>(&'a self, blend: &'a BlendRecord) -> Task<'a, bool>;
+
+    /// The blend of this id.
+    fn blend<'a>(&'a self, id: &'a str) -> Task<'a, Option<BlendRecord>>;
+}
+
+/// Jobs on record.
+pub trait JobBook: Send + Sync {
+    /// Records a job as queued, unless its subject has an unfinished one: then that one is the answer.
+    fn submit_job<'a>(&'a self, job: &'a NewJob) -> Task<'a, Submitted>;
+
+    /// The job of this id.
+    fn job<'a>(&'a self, id: &'a str) -> Task<'a, Option<JobRecord>>;
+
+    /// All queued and running jobs in the order they came.
+    fn unfinished_jobs(&self) -> Task<'_, Vec<JobRecord>>;
+
+    /// Marks an unfinished job as begun once more.
+    fn begin_job<'a>(&'a self, id: &'a str) -> Task<'a, ()>;
+
+    /// Marks a begun job as queued again, as if it had not been begun.
+    fn return_job<'a>(&'a self, id: &'a str) -> Task<'a, ()>;
+
+    /// Ends an unfinished job as done, failed or cancelled. `false` when it had ended already.
+    fn end_job<'a>(&'a self, id: &'a str, state: JobState, problem: Option<&'a str>) -> Task<'a, bool>;
+}
+
+/// The whole catalogue.
+pub trait Catalogue: Paints + Blends + JobBook {
+    /// Asks the backend for a sign of life.
+    fn ping(&self) -> Task<'_, ()>;
+
+    /// Whether a paint, a blend or the request of an unfinished job names this blob.
+    fn names_blob(&self, blob: Hash) -> Task<'_, bool>;
+}
+
+impl JobState {
+    /// Whether nothing more happens.
+    #[must_use]
+    pub const fn is_final(self) -> bool {
+        matches!(self, Self::Done | Self::Failed | Self::Cancelled)
+    }
+
+    /// The word that is stored and told.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Queued => "queued",
+            Self::Running => "running",
+            Self::Done => "done",
+            Self::Failed => "failed",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    pub(super) fn of_word(word: &str) -> Option<Self> {
+        [Self::Queued, Self::Running, Self::Done, Self::Failed, Self::Cancelled].into_iter().find(|s| s.word() == word)
+    }
+}
+
+impl JobKind {
+    /// The word that is stored and told.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Ingest => "ingest",
+            Self::Blend => "blend",
+        }
+    }
+
+    pub(super) fn of_word(word: &str) -> Option<Self> {
+        [Self::Ingest, Self::Blend].into_iter().find(|k| k.word() == word)
+    }
+}

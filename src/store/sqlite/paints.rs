@@ -1,0 +1,77 @@
+//! Paints in SQLite.
+
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+use super::{SqliteCatalogue, hash};
+use crate::store::blobs::Task;
+use crate::store::{PaintPage, PaintRecord, Paints, StoreError};
+
+fn record(row: &SqliteRow) -> Result<PaintRecord, StoreError> {
+    let measurement: Option<String> = row.try_get("measurement")?;
+    Ok(PaintRecord {
+        id: row.try_get("id")?,
+        name: row.try_get("name")?,
+        source: row.try_get("source")?,
+        measurement: measurement.map(|text| hash(&text, "paint")).transpose()?,
+        paint: hash(row.try_get("paint")?, "paint")?,
+        content: hash(row.try_get("content")?, "paint")?,
+    })
+}
+
+impl Paints for SqliteCatalogue {
+    fn add_paint<'a>(&'a self, paint: &'a PaintRecord) -> Task<'a, bool> {
+        Box::pin(async move {
+            let added = sqlx::query(
+                "INSERT INTO paints (id, name, source, words, measurement, paint, content)
+                 VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING",
+            )
+            .bind(&paint.id)
+            .bind(&paint.name)
+            .bind(&paint.source)
+            .bind(format!("{}\n{}", paint.name, paint.source).to_lowercase())
+            .bind(paint.measurement.map(|hash| hash.to_string()))
+            .bind(paint.paint.to_string())
+            .bind(paint.content.to_string())
+            .execute(&self.write)
+            .await?;
+            Ok(added.rows_affected() == 1)
+        })
+    }
+
+    fn paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>> {
+        Box::pin(async move {
+            let row = sqlx::query("SELECT * FROM paints WHERE id = ?").bind(id).fetch_optional(&self.read).await?;
+            row.as_ref().map(record).transpose()
+        })
+    }
+
+    fn paints<'a>(&'a self, q: Option<&'a str>, cursor: Option<i64>, limit: u32) -> Task<'a, PaintPage> {
+        Box::pin(async move {
+            // One more than asked for tells whether there is a next page.
+            let rows = sqlx::query(
+                "SELECT * FROM paints WHERE seq > ? AND (? = '' OR instr(words, ?) > 0) ORDER BY seq LIMIT ?",
+            )
+            .bind(cursor.unwrap_or(0))
+            .bind(q.unwrap_or("").to_lowercase())
+            .bind(q.unwrap_or("").to_lowercase())
+            .bind(i64::from(limit) + 1)
+            .fetch_all(&self.read)
+            .await?;
+            let page = &rows[..rows.len().min(limit as usize)];
+            let next = match page.last() {
+                Some(last) if rows.len() > page.len() => Some(last.try_get("seq")?),
+                _ => None,
+            };
+            Ok(PaintPage { paints: page.iter().map(record).collect::<Result<_, _>>()?, next })
+        })
+    }
+
+    fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>> {
+        Box::pin(async move {
+            let row =
+                sqlx::query("DELETE FROM paints WHERE id = ? RETURNING *").bind(id).fetch_optional(&self.write).await?;
+            row.as_ref().map(record).transpose()
+        })
+    }
+}

@@ -1,0 +1,67 @@
+//! What is known about a paint or a blend, as one JSON object: the same for HTTP and for the command line.
+
+use serde_json::{Value, json};
+
+use crate::blend::Blend;
+use crate::paint::{ASPECULAR_DEG, Chi, PaintFile, Reflectance, instrument_pairs};
+
+/// Parameters, readings, residuals with their floor, energy certificate, flake statistics and warnings of a paint.
+#[must_use]
+pub fn describe_paint(file: &PaintFile) -> Value {
+    let paint = &file.paint;
+    let reflectance = Reflectance::new(paint);
+    let readings: Vec<Value> = ASPECULAR_DEG
+        .iter()
+        .zip(instrument_pairs())
+        .map(|(angle, (wi, wo))| {
+            let factor = reflectance.evaluate(wi, wo, Chi::Table).map(|f| f * std::f64::consts::PI);
+            let lab = crate::color::Lab::from_rgb(factor);
+            json!({ "aspecular_deg": angle, "L": lab.l, "a": lab.a, "b": lab.b })
+        })
+        .collect();
+    let table = &paint.color_table;
+    json!({
+        "name": file.name,
+        "hash": paint.content_hash().to_hex().to_string(),
+        "provenance": file.provenance,
+        "parameters": {
+            "coat": paint.coat,
+            "diffuse": paint.diffuse,
+            "lobes": paint.lobes,
+            "color_table": { "theta_h": table.theta_h().len(), "theta_d": table.theta_d().len(), "overall": table.overall() },
+        },
+        "flakes": paint.flakes.as_ref().map(|flakes| json!({
+            "theta_h_deg": flakes.theta_h.degrees(),
+            "theta_d_deg": flakes.theta_d.degrees(),
+            "slices": flakes.slices(),
+            "clusters": flakes.clusters(),
+            "widest_slice": flakes.widest_slice(),
+            "texel_um": flakes.texture.texel_um,
+            "grain_um": flakes.texture.grain_um,
+            "lifetime_deg": flakes.texture.lifetime_deg,
+            "persistence_deg": flakes.texture.persistence_deg,
+            "clustering": file.clustering,
+        })),
+        "readings": { "illuminant": "D65", "observer": "2", "illumination_deg": 45, "rows": readings },
+        "residuals": file.residuals,
+        "energy": file.energy,
+        "warnings": file.warnings,
+    })
+}
+
+/// Ingredients, settings and correspondence of a blend.
+#[must_use]
+pub fn describe_blend(blend: &Blend) -> Value {
+    let paints: Vec<Value> = blend.ingredients().map(|(name, hash)| json!({ "name": name, "hash": hash })).collect();
+    json!({
+        "paints": paints,
+        "weights": format!("{} numbers, in this order", blend.len()),
+        "settings": blend.settings(),
+        "correspondence": blend.report(),
+        "flakes": blend.flakes.as_ref().map(|f| json!({
+            "theta_h_deg": f.theta_h.degrees(),
+            "theta_d_deg": f.theta_d.degrees(),
+            "textures": f.textures,
+        })),
+    })
+}

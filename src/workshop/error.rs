@@ -1,0 +1,60 @@
+//! What goes wrong in a use case, told so that the caller can mend it.
+
+use std::fmt::Display;
+
+/// Whose fault it is: decides the exit code and the HTTP status.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The request asks for something that is not offered or does not fit together.
+    Usage,
+    /// A file or an upload is not what it should be.
+    Input,
+    /// The answer could not be written.
+    Output,
+    /// A bug, or a machine that fails us.
+    Internal,
+}
+
+/// A use case that failed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{message}")]
+pub struct WorkshopError {
+    /// Whose fault it is.
+    pub fault: Fault,
+    /// The field or option that is wrong, where one can be named.
+    pub field: Option<String>,
+    /// What is wrong, with the value and what would be accepted.
+    pub message: String,
+}
+
+impl WorkshopError {
+    /// A request that does not fit together.
+    pub fn usage(field: &str, message: impl Display) -> Self {
+        Self { fault: Fault::Usage, field: Some(field.to_owned()), message: message.to_string() }
+    }
+
+    /// A file that is not what it should be; `name` is what the caller knows it by.
+    pub fn input(name: impl Display, problem: impl Display) -> Self {
+        Self { fault: Fault::Input, field: None, message: format!("{name}: {problem}") }
+    }
+
+    /// An answer that could not be written.
+    pub fn output(name: impl Display, problem: impl Display) -> Self {
+        Self { fault: Fault::Output, field: None, message: format!("{name}: {problem}") }
+    }
+
+    /// A bug.
+    pub fn internal(problem: impl Display) -> Self {
+        Self { fault: Fault::Internal, field: None, message: problem.to_string() }
+    }
+}
+
+impl From<crate::blend::WeightError> for WorkshopError {
+    fn from(error: crate::blend::WeightError) -> Self {
+        use crate::blend::WeightError as W;
+        let field = match &error {
+            W::Count { field, .. } | W::Value { field, .. } => field,
+        };
+        Self::usage(field, &error)
+    }
+}

@@ -1,0 +1,119 @@
+//! Evaluating a paint, a blend at given weights, or a raw measurement at pairs of directions.
+
+use serde::{Deserialize, Serialize};
+
+use super::WorkshopError;
+use super::ingest::{Measurement, table_of};
+use crate::measurement::{FlakePictures as _, MeasuredBrdf as _, Package, PackageBase};
+use crate::paint::{
+    CarPaint, Chi, Direction, HalfAngles, Limits, Reflectance, at_angles, fresnel, half_angles, refract,
+};
+
+/// Direction pairs to evaluate.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pairs {
+    /// Light and view directions, unit vectors with z along the normal.
+    pub pairs: Vec<[Direction; 2]>,
+}
+
+/// BRDF values of direction pairs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Values {
+    /// BRDF in 1/sr, linear sRGB, `null` where a measurement holds nothing.
+    pub f: Vec<Option<[f64; 3]>>,
+    /// Weight of the coat's perfect mirror image seen from each view direction, where it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mirror: Option<Vec<f64>>,
+}
+
+impl Pairs {
+    /// Reads pairs and checks that they are unit vectors.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkshopError`] for JSON that is none, too many pairs, or a vector that is not of unit length to 1e-3.
+    pub fn from_json(name: &str, json: &[u8], limits: &Limits) -> Result<Self, WorkshopError> {
+        let mut pairs: Self = serde_json::from_slice(json)
+            .map_err(|e| WorkshopError::input(name, format!("{e}; accepted is {{\"pairs\": [[[ix,iy,iz],[ox,oy,oz]], …]}}")))?;
+        if pairs.pairs.len() > limits.pairs {
+            let problem = format!("{} pairs, accepted are up to {}", pairs.pairs.len(), limits.pairs);
+            return Err(WorkshopError::input(name, problem));
+        }
+        for (k, pair) in pairs.pairs.iter_mut().enumerate() {
+            for (end, w) in pair.iter_mut().enumerate() {
+                let length = (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]).sqrt();
+                if (length - 1.0).abs() > 1e-3 || !length.is_finite() {
+                    let problem = format!("pairs[{k}][{end}] has length {length}, accepted are unit vectors");
+                    return Err(WorkshopError::input(name, problem));
+                }
+                *w = w.map(|v| v / length);
+            }
+        }
+        Ok(pairs)
+    }
+}
+
+/// Evaluates a paint, flakes at their mean.
+#[must_use]
+pub fn evaluate(paint: &CarPaint, pairs: &Pairs, chi: Chi) -> Values {
+    let reflectance = Reflectance::new(paint);
+    let f = pairs.pairs.iter().map(|&[wi, wo]| Some(reflectance.evaluate(wi, wo, chi))).collect();
+    let mirror = paint.coat.filter(crate::paint::Coat::is_mirror).map(|_| {
+        pairs.pairs.iter().map(|&[wi, wo]| if wi[2] > 0.0 { reflectance.mirror(wo) } else { 0.0 }).collect()
+    });
+    Values { f, mirror }
+}
+
+/// Evaluates a measurement as it is: negative values kept, `None` where it holds nothing. Of a package, the base plus the
+/// mean of the texels, both through the coat.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for a package whose table or pictures are damaged.
+pub fn evaluate_raw(measurement: &Measurement, pairs: &Pairs) -> Result<Values, WorkshopError> {
+    let f = match measurement {
+        Measurement::Brdf(brdf, _) => pairs.pairs.iter().map(|&[wi, wo]| brdf.reflectance(wi, wo)).collect(),
+        Measurement::Package(package) => raw_package(package, pairs)?,
+    };
+    Ok(Values { f, mirror: None })
+}
+
+fn raw_package(package: &Package, pairs: &Pairs) -> Result<Vec<Option<[f64; 3]>>, WorkshopError> {
+    let wrong = |problem: &dyn std::fmt::Display| WorkshopError::input(&package.name, problem);
+    let means = package.flakes.as_ref().map(|slices| slices.mean_colors()).transpose().map_err(|e| wrong(&e))?;
+    let flakes = |half: &HalfAngles| match (&package.flakes, &means) {
+        (Some(slices), Some(means)) => at_angles(means, slices.theta_h(), slices.theta_d(), half),
+        _ => [0.0; 3],
+    };
+    let (coat, ior) = (package.coat, package.coat.map_or(1.0, |c| c.ior));
+    let through = |wi: Direction, wo: Direction, base: [f64; 3]| {
+        let inner = half_angles(refract(wi, ior), refract(wo, ior));
+        let (transmission, flakes) = ((1.0 - fresnel(wi[2], ior)) * (1.0 - fresnel(wo[2], ior)), flakes(&inner));
+        std::array::from_fn(|k| transmission * (base[k] + flakes[k]))
+    };
+    let above = |w: Direction| w[2] > 0.0;
+    match &package.base {
+        None => Err(wrong(&"base: there is neither a model nor a brdf_table to evaluate")),
+        Some(PackageBase::Model { diffuse, lobes, color_table }) => {
+            let (lobes, color_table) = (lobes.clone(), color_table.clone());
+            let base = CarPaint { coat, diffuse: *diffuse, lobes, color_table, flakes: None };
+            let reflectance = Reflectance::new(&base);
+            let value = |&[wi, wo]: &[Direction; 2]| {
+                let terms = reflectance.terms(wi, wo, Chi::Table);
+                Some(terms.map_or([0.0; 3], |terms| through(wi, wo, terms.base)))
+            };
+            Ok(pairs.pairs.iter().map(value).collect())
+        }
+        Some(base) => {
+            let table = table_of(base).map_err(|e| wrong(&e))?;
+            let value = |&[wi, wo]: &[Direction; 2]| {
+                if !(above(wi) && above(wo)) {
+                    return None;
+                }
+                table.reflectance(refract(wi, ior), refract(wo, ior)).map(|base| through(wi, wo, base))
+            };
+            Ok(pairs.pairs.iter().map(value).collect())
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! The use cases: ingest, blend, realise, preview, evaluate, show. What both doors, HTTP and command line, call.
+//!
+//! Functions here are synchronous and compute; they read the files they are told to read and write none. Long work takes
+//! a function that hears the share done. Every failure is a [`WorkshopError`] that says whose fault it is.
+
+mod blending;
+mod describing;
+mod error;
+mod evaluating;
+mod ingest;
+mod previewing;
+mod realising;
+mod samples;
+mod thing;
+
+pub use blending::{Blended, blend_paints};
+pub use describing::{describe_blend, describe_paint};
+pub use error::{Fault, WorkshopError};
+pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
+pub use ingest::{IngestOptions, Measurement, ingest, ingest_upload, open_measurement};
+pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};
+pub use realising::{Format, Made, realise};
+pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
+pub use thing::{Source, Thing, find, open, open_paint, read};

@@ -1,0 +1,113 @@
+//! Pictures of a paint, and its flakes texel by texel.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::realising::{Made, choose};
+use super::{Thing, WorkshopError, read};
+use crate::blend::RealisationWeights;
+use crate::paint::{CarPaint, Limits};
+use crate::render::{self, Environment, RenderError, Scene, Shape};
+
+/// What a picture shows.
+#[derive(Clone, Debug)]
+pub struct PreviewOptions {
+    /// `sphere`, `capsule` or `panel`.
+    pub scene: String,
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Samples per pixel.
+    pub samples_per_pixel: u32,
+    /// Panorama that lights it; the built-in studio unless given.
+    pub environment: Option<Environment>,
+}
+
+/// What a picture is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PictureFormat {
+    /// Tone mapped for a screen, 8 bits.
+    Png,
+    /// Linear light.
+    Exr,
+}
+
+impl PictureFormat {
+    /// The format that a file name's ending means.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkshopError`] for another ending, naming those that are accepted.
+    pub fn of_path(path: &Path) -> Result<Self, WorkshopError> {
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            _ => {
+                let problem = format!("{} ends in neither .png nor .exr", path.display());
+                Err(WorkshopError::usage("--out", problem))
+            }
+        }
+    }
+}
+
+/// Reads a panorama.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for a file that cannot be read or is no `.hdr` or `.exr` picture.
+pub fn read_environment(path: &Path, limits: &Limits) -> Result<Environment, WorkshopError> {
+    let bytes = read(path, limits)?;
+    Environment::from_bytes(&bytes, limits).map_err(|e| WorkshopError::input(path.display(), e))
+}
+
+/// Draws a paint, or a blend at the given weights.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for a scene that is not offered, a size or a sample count out of range, or refused weights.
+pub fn preview(
+    thing: &Thing,
+    weights: Option<&RealisationWeights>,
+    options: &PreviewOptions,
+    format: PictureFormat,
+    limits: &Limits,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Made, WorkshopError> {
+    let shape: Shape = serde_json::from_value(json!(options.scene)).map_err(|_| {
+        WorkshopError::usage("scene", format!("there is no scene '{}'; there are sphere, capsule and panel", options.scene))
+    })?;
+    let mut scene = Scene::new(shape, options.size);
+    scene.samples_per_pixel = options.samples_per_pixel;
+    if let Some(environment) = &options.environment {
+        scene = scene.in_environment(environment.clone());
+    }
+    scene.validate(limits).map_err(refused)?;
+    let chosen = choose(thing, weights)?;
+    let rendering = render::render(&chosen.paint, &scene, progress).map_err(refused)?;
+    let bytes = match format {
+        PictureFormat::Png => rendering.film.to_png(),
+        PictureFormat::Exr => rendering.film.to_exr(),
+    }
+    .map_err(WorkshopError::internal)?;
+    let report = json!({ "realisation": chosen.report, "rendering": rendering.report });
+    Ok(Made { bytes, report, notes: chosen.notes })
+}
+
+fn refused(error: RenderError) -> WorkshopError {
+    WorkshopError::usage("scene", error)
+}
+
+/// The flakes at an angle pair in degrees, as the random texture draws them, as an EXR.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for a paint without flakes or a picture too large.
+pub fn texels(
+    paint: &CarPaint,
+    theta_deg: [f64; 2],
+    size: [u32; 2],
+    seed: u32,
+    limits: &Limits,
+) -> Result<Vec<u8>, WorkshopError> {
+    render::texels(paint, theta_deg[0], theta_deg[1], size, seed, limits).map_err(refused)
+}

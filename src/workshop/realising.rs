@@ -1,0 +1,162 @@
+//! Realising a blend, or exporting a paint as it is, to a file that others use.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::{Thing, WorkshopError};
+use crate::accuracy::Profile;
+use crate::blend::{Blend, Clamp, RealisationWeights};
+use crate::export::{self, About};
+use crate::paint::{CarPaint, Clustering, PaintFile, Provenance, certify};
+
+/// What a realisation is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// Texture bundle.
+    Zip,
+    /// glTF binary.
+    Glb,
+    /// `material.json` with the textures inline.
+    Json,
+    /// A `.paint`, which can be blended again.
+    Paint,
+}
+
+/// Bytes that were made, and what is known about them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Made {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// What is in it: weights, clamps.
+    pub report: Value,
+    /// The same for people, one line each.
+    pub notes: Vec<String>,
+}
+
+impl Format {
+    /// The format that a file name's ending means.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkshopError`] for another ending, naming those that are accepted.
+    pub fn of_path(path: &Path) -> Result<Self, WorkshopError> {
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("zip") => Ok(Self::Zip),
+            Some("glb") => Ok(Self::Glb),
+            Some("json") => Ok(Self::Json),
+            Some("paint") => Ok(Self::Paint),
+            _ => {
+                let problem = format!("{} ends in none of .zip, .glb, .json, .paint", path.display());
+                Err(WorkshopError::usage("--out", problem))
+            }
+        }
+    }
+}
+
+/// One paint out of a thing, with the account of how it came about.
+pub(super) struct Chosen {
+    pub name: String,
+    pub provenance: Provenance,
+    pub paint: CarPaint,
+    pub clamps: Vec<Clamp>,
+    pub report: Value,
+    pub notes: Vec<String>,
+}
+
+/// The paint itself, or the blend at the given weights.
+pub(super) fn choose(thing: &Thing, weights: Option<&RealisationWeights>) -> Result<Chosen, WorkshopError> {
+    match thing {
+        Thing::Paint(file) => Ok(Chosen {
+            name: file.name.clone(),
+            provenance: file.provenance.clone(),
+            paint: file.paint.clone(),
+            clamps: Vec::new(),
+            report: json!({ "paint": file.name, "warnings": file.warnings }),
+            notes: Vec::new(),
+        }),
+        Thing::Blend(blend) => {
+            let weights = weights.ok_or_else(|| WorkshopError::usage("weights", "a blend needs weights"))?;
+            of_blend(blend, weights)
+        }
+    }
+}
+
+fn of_blend(blend: &Blend, weights: &RealisationWeights) -> Result<Chosen, WorkshopError> {
+    let realised = blend.realise(weights)?;
+    let (names, hashes): (Vec<&str>, Vec<&str>) = blend.ingredients().unzip();
+    let mut notes: Vec<String> = realised
+        .clamps
+        .iter()
+        .map(|c| format!("{}: {}, {} of {}, the worst by {:.4}", c.field, c.bound, c.count, c.of, c.worst))
+        .collect();
+    for (what, sum) in ["base", "flake lightness", "flake color"].iter().zip(realised.weight_sums) {
+        if (sum - 1.0).abs() > 1e-6 {
+            notes.push(format!("weights of {what} sum to {sum}, not 1"));
+        }
+    }
+    let report = json!({
+        "paints": names,
+        "hashes": hashes,
+        "weights": weights,
+        "weight_sums": realised.weight_sums,
+        "clamps": realised.clamps,
+        "correspondence": blend.report(),
+    });
+    let provenance = Provenance {
+        source: "blend".to_owned(),
+        hashes: hashes.iter().map(|&h| h.to_owned()).collect(),
+        ..Provenance::default()
+    };
+    Ok(Chosen { name: names.join(" + "), provenance, paint: realised.paint, clamps: realised.clamps, report, notes })
+}
+
+/// Writes a paint, or a blend at the given weights, as a file of the given format.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for a blend without weights, weights it refuses, or an export that fails.
+pub fn realise(
+    thing: &Thing,
+    weights: Option<&RealisationWeights>,
+    format: Format,
+    profile: &Profile,
+) -> Result<Made, WorkshopError> {
+    if let (Format::Paint, Thing::Paint(file)) = (format, thing) {
+        return Ok(Made { bytes: file.to_bytes(), report: json!({ "paint": file.name }), notes: Vec::new() });
+    }
+    let chosen = choose(thing, weights)?;
+    let about = About { name: chosen.name.clone(), provenance: chosen.provenance.clone(), report: chosen.report.clone() };
+    let bytes = match format {
+        Format::Zip => export::bundle(&chosen.paint, &about, &profile.export),
+        Format::Glb => export::material_json(&chosen.paint, &about, &profile.export),
+        Format::Json => export::material_json(&chosen.paint, &about, &profile.export),
+        Format::Paint => {
+            return Ok(Made { bytes: paint_file(&chosen).to_bytes(), report: chosen.report, notes: chosen.notes });
+        }
+    }
+    .map_err(WorkshopError::internal)?;
+    Ok(Made { bytes, report: chosen.report, notes: chosen.notes })
+}
+
+/// A realised paint as a paint of its own.
+fn paint_file(chosen: &Chosen) -> PaintFile {
+    let clustering = chosen
+        .paint
+        .flakes
+        .as_ref()
+        .map(|f| Clustering { clusters: f.widest_slice(), box_rule: "blended".to_owned(), w1: None });
+    PaintFile {
+        name: chosen.name.chars().take(200).collect(),
+        provenance: chosen.provenance.clone(),
+        energy: certify(&chosen.paint),
+        paint: chosen.paint.clone(),
+        clustering,
+        residuals: None,
+        warnings: chosen
+            .clamps
+            .iter()
+            .map(|c| format!("{}: {}, {} of {}, the worst by {:.4}", c.field, c.bound, c.count, c.of, c.worst))
+            .collect(),
+    }
+}

@@ -1,0 +1,131 @@
+//! What a caller names: a sample, a `.paint`, a `.blend` or a measurement.
+
+use std::path::{Path, PathBuf};
+
+use super::ingest::{IngestOptions, ingest};
+use super::{WorkshopError, samples};
+use crate::blend::{Blend, RealisationWeights, Realised};
+use crate::paint::{CarPaint, Limits, PaintFile};
+
+/// Where a named thing is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// A file or a folder that exists.
+    Path(PathBuf),
+    /// One of the built-in samples.
+    Sample(&'static samples::Sample),
+}
+
+/// A paint, or several with their correspondence.
+#[derive(Clone, Debug)]
+pub enum Thing {
+    /// One paint.
+    Paint(Box<PaintFile>),
+    /// Several paints; needs weights to become one.
+    Blend(Box<Blend>),
+}
+
+/// Finds what a name means: an existing path wins over a sample's name, `sample:NAME` is always the sample.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for a name that is neither, listing the samples.
+pub fn find(name: &str) -> Result<Source, WorkshopError> {
+    let known = || samples::SAMPLES.iter().map(|s| s.name).collect::<Vec<_>>().join(", ");
+    if let Some(sample) = name.strip_prefix("sample:") {
+        return samples::by_name(sample).map(Source::Sample).ok_or_else(|| {
+            WorkshopError::input(name, format!("there is no sample '{sample}'; there are {}", known()))
+        });
+    }
+    let path = Path::new(name);
+    if path.exists() {
+        return Ok(Source::Path(path.to_owned()));
+    }
+    samples::by_name(name)
+        .map(Source::Sample)
+        .ok_or_else(|| WorkshopError::input(name, format!("no such file, and no sample of this name; samples are {}", known())))
+}
+
+/// Reads the bytes of a file, its name in every error.
+///
+/// # Errors
+///
+/// [`WorkshopError`] when the file cannot be read or is larger than `limits.bytes`.
+pub fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, WorkshopError> {
+    let fail = |e: std::io::Error| WorkshopError::input(path.display(), format!("cannot be read: {e}"));
+    let length = std::fs::metadata(path).map_err(fail)?.len();
+    if length > limits.bytes {
+        let problem = format!("{length} bytes, accepted are up to {}", limits.bytes);
+        return Err(WorkshopError::input(path.display(), problem));
+    }
+    std::fs::read(path).map_err(fail)
+}
+
+/// First bytes of a file, to tell what it is; a folder has none.
+pub(super) fn first_bytes(path: &Path) -> Result<Vec<u8>, WorkshopError> {
+    use std::io::Read as _;
+    if path.is_dir() {
+        return Ok(Vec::new());
+    }
+    let fail = |e: std::io::Error| WorkshopError::input(path.display(), format!("cannot be read: {e}"));
+    let mut head = Vec::new();
+    std::fs::File::open(path).map_err(fail)?.take(16).read_to_end(&mut head).map_err(fail)?;
+    Ok(head)
+}
+
+/// A paint from a measurement, a `.paint` or a sample.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for a name that is nothing, a damaged file, a blend, or clusters other than asked for.
+pub fn open_paint(name: &str, options: &IngestOptions, progress: &(dyn Fn(f32) + Sync)) -> Result<PaintFile, WorkshopError> {
+    match open(name, options, progress)? {
+        Thing::Paint(paint) => Ok(*paint),
+        Thing::Blend(_) => {
+            let problem = "this is a blend; realise it to a .paint first, which can be blended again";
+            Err(WorkshopError::input(name, problem))
+        }
+    }
+}
+
+/// Whatever the name means; measurements are ingested.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for a name that is nothing or a damaged file.
+pub fn open(name: &str, options: &IngestOptions, progress: &(dyn Fn(f32) + Sync)) -> Result<Thing, WorkshopError> {
+    let path = match find(name)? {
+        Source::Sample(sample) => return Ok(Thing::Paint(Box::new(sample.build(&options.profile, progress)?))),
+        Source::Path(path) => path,
+    };
+    let head = first_bytes(&path)?;
+    if Blend::recognises(&head) {
+        let bytes = read(&path, &options.limits)?;
+        let blend = Blend::from_bytes(&bytes, &options.limits).map_err(|e| WorkshopError::input(name, e))?;
+        return Ok(Thing::Blend(Box::new(blend)));
+    }
+    if PaintFile::recognises(&head) {
+        let bytes = read(&path, &options.limits)?;
+        let paint = PaintFile::from_bytes(&bytes, &options.limits).map_err(|e| WorkshopError::input(name, e))?;
+        options.check_clusters(name, &paint)?;
+        return Ok(Thing::Paint(Box::new(paint)));
+    }
+    ingest(&path, options, progress).map(|paint| Thing::Paint(Box::new(paint)))
+}
+
+impl Thing {
+    /// The one paint this is: a paint as it stands, a blend at the given weights.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkshopError`] for weights that the blend refuses.
+    pub fn realise(self, weights: impl FnOnce(&Blend) -> Result<Option<RealisationWeights>, WorkshopError>) -> Result<Realised<CarPaint>, WorkshopError> {
+        match self {
+            Self::Paint(file) => Ok(Realised { paint: file.paint, clamps: Vec::new(), weight_sums: [1.0; 3] }),
+            Self::Blend(blend) => match weights(&blend)? {
+                Some(weights) => Ok(blend.realise(&weights)?),
+                None => Err(WorkshopError::internal("a blend without weights")),
+            },
+        }
+    }
+}
