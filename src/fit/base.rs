@@ -4,11 +4,9 @@
 //! brings the result clearly nearer to the measurement, or when the bare fit misses its aim and the coat helps:
 //! a second, wide lobe must not become a coat for a per cent.
 
-use std::f64::consts::PI;
-
 use super::color_table::{Frame, fit_color_table};
 use super::directions::{Sample, TRUSTED_DEG, measure};
-use super::lobes::{CoatSearch, LOBES, Shape, fit_shape, unit_of};
+use super::lobes::{CoatSearch, Shape, fit_shape, unit_of};
 use super::residual::{Judge, Percentiles};
 use crate::color::LinearRgb;
 use crate::measurement::MeasuredBrdf;
@@ -20,6 +18,10 @@ const SAMPLES: usize = 8000;
 const LEAST_SAMPLES: usize = 200;
 /// What the logarithm of all errors together must fall by for a coat to be taken.
 const COAT_GAIN: f64 = 0.2;
+/// What it must fall by for a coat that is as smooth and dense as a clear coat.
+const COAT_GAIN_IF_CLEAR: f64 = 0.05;
+const CLEAR_ROUGHNESS: f64 = 0.1;
+const CLEAR_IOR: f64 = 1.3;
 /// What it must fall by where the bare fit misses [`AIM`].
 const COAT_GAIN_IN_NEED: f64 = 0.03;
 /// Error against the floor that a fit aims at.
@@ -128,16 +130,23 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
     let unit = unit_of(&samples);
     let judge = Judge::new(measured, frame, unit);
     let floors = judge.floor_errors();
-    let mut candidates = Vec::new();
+    let mut candidates: Vec<Candidate> = Vec::new();
     for search in searches {
-        let Some(shape) = fit_shape(&samples, search, unit) else { continue };
+        let bare = candidates.first().map(|c| &c.shape);
+        let Some(shape) = fit_shape(&samples, search, unit, bare) else { continue };
         candidates.push(candidate(measured, frame, shape, &samples, unit, &judge, &floors));
     }
     let mut candidates = candidates.into_iter();
     let mut best = candidates.next().ok_or(FitError::NoAnswer)?;
     for other in candidates {
         let gain = best.score - other.score;
-        if gain > COAT_GAIN || (best.worst > AIM && gain > COAT_GAIN_IN_NEED) {
+        let clear = other.shape.coat.is_some_and(|(ior, roughness)| roughness <= CLEAR_ROUGHNESS && ior >= CLEAR_IOR);
+        let needed = match () {
+            () if best.worst > AIM => COAT_GAIN_IN_NEED,
+            () if clear => COAT_GAIN_IF_CLEAR,
+            () => COAT_GAIN,
+        };
+        if gain > needed {
             best = other;
         }
     }
@@ -186,14 +195,13 @@ fn paint_of(shape: &Shape, color_table: ColorTable) -> CarPaint {
 }
 
 fn finish(best: Candidate, judge: &Judge) -> Result<FittedBase, FitError> {
-    let mut shape = best.shape;
+    let shape = best.shape;
     for (field, value) in [("diffuse", shape.diffuse)].into_iter().chain(shape.lobes.map(|l| ("a lobe's weight", l.0)))
     {
         if !(0.0..=MAX_WEIGHT).contains(&value) {
             return Err(FitError::NotAReflectance { field, value });
         }
     }
-    drop_what_does_not_show(&mut shape);
     let mut warnings = Vec::new();
     if shape.agreeing < 2 {
         warnings.push(format!(
@@ -220,18 +228,6 @@ fn finish(best: Candidate, judge: &Judge) -> Result<FittedBase, FitError> {
     }
     let CarPaint { coat, diffuse, lobes, color_table, .. } = paint;
     Ok(FittedBase { diffuse, lobes, color_table, coat, residuals, warnings })
-}
-
-/// Lobes that nowhere reach a ten-thousandth of the rest's peak get weight 0.
-fn drop_what_does_not_show(shape: &mut Shape) {
-    // At grazing the Fresnel value goes to 1, whatever it is at normal incidence.
-    let peaks = shape.lobes.map(|(s, alpha, _)| s / (PI * alpha * alpha));
-    let total = shape.diffuse / PI + peaks.iter().sum::<f64>();
-    for k in 0..LOBES {
-        if peaks[k] < 1e-4 * (total - peaks[k]) {
-            shape.lobes[k].0 = 0.0;
-        }
-    }
 }
 
 #[cfg(test)]
