@@ -18,8 +18,8 @@ pub(super) enum Ground {
     Grid(Vec<f32>),
 }
 
-const NODES: u16 = 72;
-const REACH: f32 = 4.0;
+const NODES: u16 = 96;
+const REACH: f32 = 3.2;
 
 impl Ground {
     pub(super) fn new(surface: &Surface) -> Self {
@@ -83,7 +83,7 @@ mod tests {
         for shape in [Shape::Capsule, Shape::Panel] {
             let ground = Ground::new(&Surface::new(shape));
             assert!(ground.occlusion(0.0, 0.0) > 0.4, "{shape:?} {}", ground.occlusion(0.0, 0.0));
-            assert!(ground.occlusion(3.5, 3.5) < 0.02);
+            assert!(ground.occlusion(3.0, 3.0) < 0.02);
         }
     }
 

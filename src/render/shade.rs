@@ -97,8 +97,10 @@ impl Batch {
 }
 
 /// Directions drawn from the environment per sample.
-const LIGHTS: u32 = 2;
-const LIGHTS_F: f32 = 2.0;
+const fn lights(flakes: bool) -> u32 {
+    // Without flakes a direction is cheap, and there is no sparkle to cover what noise is left.
+    if flakes { 2 } else { 4 }
+}
 
 /// Rays of the camera.
 struct Lens {
@@ -215,26 +217,29 @@ impl<'a> Shader<'a> {
             }
         }
         if let Some(table) = &self.light_table {
+            let count = lights(FLAKES);
+            #[allow(clippy::cast_precision_loss)] // a few
+            let count_f = count as f32;
             let facing: [usize; WIDTH] = std::array::from_fn(|k| LightTable::facing(get(&batch.normal, k)));
             let mut many = lone;
             if FLAKES {
                 let extent = Lanes(facing.map(|k| table.extent(k)));
-                many = self.contrast(texels * (extent * self.flakes_per_sr).at_least(1.0), LIGHTS_F);
+                many = self.contrast(texels * (extent * self.flakes_per_sr).at_least(1.0), count_f);
             }
-            for draw in 0..LIGHTS {
+            for draw in 0..count {
                 let (mut directions, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
                 let mut density = Lanes::splat(1.0);
                 for k in 0..WIDTH {
-                    let drawn = table.sample(facing[k], points.pair(batch.index[k] * LIGHTS + draw, 1));
+                    let drawn = table.sample(facing[k], points.one_of(draw, count, batch.index[k], 1));
                     set(&mut directions, k, drawn.direction);
                     set(&mut power, k, drawn.light);
                     density.0[k] = drawn.density;
                 }
                 let light = batch.local(directions);
                 if self.kernel.draws {
-                    shine(light, times(power, density), Some(density * LIGHTS_F), many);
+                    shine(light, times(power, density), Some(density * count_f), many);
                 } else {
-                    shine(light, times(power, Lanes::splat(1.0 / LIGHTS_F)), None, many);
+                    shine(light, times(power, Lanes::splat(1.0 / count_f)), None, many);
                 }
             }
             if self.kernel.draws {
@@ -249,7 +254,7 @@ impl<'a> Shader<'a> {
                         density.0[k] = table.density(facing[k], direction);
                     }
                 }
-                shine(light, power, Some(density * LIGHTS_F), many);
+                shine(light, power, Some(density * count_f), many);
             }
         }
         let mut light = [0.0; 3];
