@@ -111,7 +111,7 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
         CoatChoice::Ior(ior) | CoatChoice::Inside(ior) if !(1.0..=4.0).contains(&ior) => {
             return Err(FitError::Ior(ior));
         }
-        CoatChoice::Ior(ior) if ior == 1.0 => (Frame::Air, vec![CoatSearch::Bare]),
+        CoatChoice::Ior(1.0) => (Frame::Air, vec![CoatSearch::Bare]),
         CoatChoice::Ior(ior) => (Frame::Air, vec![CoatSearch::Index(ior)]),
         CoatChoice::Inside(ior) => (Frame::Inside(ior), vec![CoatSearch::Bare]),
     };
