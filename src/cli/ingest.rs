@@ -98,7 +98,8 @@ impl Ingest {
         let path = match find(&self.input)? {
             Source::Path(path) => path,
             Source::Sample(sample) => {
-                let hint = format!("a sample is no measurement; 'carpaint samples export {}' writes its .paint", sample.name);
+                let hint =
+                    format!("a sample is no measurement; 'carpaint samples export {}' writes its .paint", sample.name);
                 return Err(WorkshopError::input(&self.input, hint));
             }
         };

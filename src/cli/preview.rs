@@ -75,7 +75,8 @@ impl Preview {
             Thing::Paint(_) => refuse_weights(&self.weights).map(|()| None)?,
             Thing::Blend(blend) => Some(self.weights.for_blend(blend.ingredients().map(|(name, _)| name))?),
         };
-        let environment = self.environment.as_deref().map(|path| read_environment(path, &options.limits)).transpose()?;
+        let environment =
+            self.environment.as_deref().map(|path| read_environment(path, &options.limits)).transpose()?;
         let opened = start.elapsed();
         let wanted = PreviewOptions {
             scene: self.scene.clone(),

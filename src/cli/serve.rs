@@ -36,10 +36,8 @@ impl Serve {
                 tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "carpaint=info".into()),
             )
             .init();
-        let runtime = tokio::runtime::Builder::new_multi_thread()
-            .enable_all()
-            .build()
-            .map_err(WorkshopError::internal)?;
+        let runtime =
+            tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(WorkshopError::internal)?;
         runtime.block_on(self.serve(json))
     }
 

@@ -56,7 +56,11 @@ pub fn one_line(paint: &PaintFile) -> String {
         ));
     }
     if let Some(r) = &paint.residuals {
-        parts.push(format!("luminance error {:.1} % (floor {:.1} %)", 100.0 * r.all.median, 100.0 * r.all.floor_median));
+        parts.push(format!(
+            "luminance error {:.1} % (floor {:.1} %)",
+            100.0 * r.all.median,
+            100.0 * r.all.floor_median
+        ));
     }
     parts.join(" · ")
 }
@@ -95,7 +99,9 @@ fn inline(value: &Value) -> Option<String> {
     match value {
         Value::Null => Some("none".to_owned()),
         Value::Bool(yes) => Some(if *yes { "yes" } else { "no" }.to_owned()),
-        Value::Number(n) => Some(n.as_f64().filter(|_| !n.is_u64()).map_or_else(|| n.to_string(), |v| format!("{v:.5}"))),
+        Value::Number(n) => {
+            Some(n.as_f64().filter(|_| !n.is_u64()).map_or_else(|| n.to_string(), |v| format!("{v:.5}")))
+        }
         Value::String(text) => Some(text.clone()),
         Value::Array(list) if list.is_empty() => Some("none".to_owned()),
         Value::Array(list) if list.iter().all(Value::is_number) => {

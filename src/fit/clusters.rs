@@ -310,9 +310,8 @@ impl Clusterer {
         self.leaves.push(bucketed(&starts, &sums, 0, BUCKETS));
         // A run that lost its buckets is split by moving its texels.
         while self.leaves.len() - first < most {
-            let widest = (first..self.leaves.len()).reduce(|best, k| {
-                if self.leaves[k].spread > self.leaves[best].spread { k } else { best }
-            });
+            let widest = (first..self.leaves.len())
+                .reduce(|best, k| if self.leaves[k].spread > self.leaves[best].spread { k } else { best });
             let Some(widest) = widest.filter(|k| self.leaves[*k].spread > 0.0) else { break };
             let node = self.leaves[widest];
             let mean = origin[node.axis] + node.sums.first[node.axis] / node.sums.count;
@@ -323,9 +322,8 @@ impl Clusterer {
             let halves = halves.or_else(|| {
                 let middle = node.from + partition(&mut self.texels[node.from..node.to], node.axis, mean);
                 (middle > node.from && middle < node.to).then(|| {
-                    [(node.from, middle), (middle, node.to)].map(|(from, to)| {
-                        Node::new(from, to, None, Sums::of(&self.texels[from..to], &origin))
-                    })
+                    [(node.from, middle), (middle, node.to)]
+                        .map(|(from, to)| Node::new(from, to, None, Sums::of(&self.texels[from..to], &origin)))
                 })
             });
             match halves {

@@ -147,7 +147,8 @@ mod tests {
 
     fn flakes(count: u32) -> Flakes {
         let spread = |k: u32, step: u32| f64::from(k * step % 97) as f32;
-        let lower: Vec<[f32; 3]> = (0..count).map(|k| [spread(k, 31), spread(k, 17) - 48.0, spread(k, 53) - 48.0]).collect();
+        let lower: Vec<[f32; 3]> =
+            (0..count).map(|k| [spread(k, 31), spread(k, 17) - 48.0, spread(k, 53) - 48.0]).collect();
         Flakes {
             theta_h: AngleGrid::single(),
             theta_d: AngleGrid::single(),
@@ -178,6 +179,9 @@ mod tests {
         let reduced = reduce_clusters(&few, 50);
         assert_eq!(reduced.probability, few.probability);
         few.lower.sort_by(|x, y| x[0].total_cmp(&y[0]));
-        assert_eq!(reduced.lower.iter().map(|l| l[0]).collect::<Vec<_>>(), few.lower.iter().map(|l| l[0]).collect::<Vec<_>>());
+        assert_eq!(
+            reduced.lower.iter().map(|l| l[0]).collect::<Vec<_>>(),
+            few.lower.iter().map(|l| l[0]).collect::<Vec<_>>()
+        );
     }
 }

@@ -342,11 +342,7 @@ fn flakes(field: &Field, limits: &Limits, warnings: &mut Vec<String>) -> Result<
         pattern,
         theta_h: field.want("theta_h_deg", "a list of angles")?.angles(limits)?,
         theta_d: field.want("theta_i_deg", "a list of angles")?.angles(limits)?,
-        texel_um: field.want("texel_um", "above 0, to 100000")?.number(
-            f64::MIN_POSITIVE,
-            1e5,
-            "above 0, to 100000",
-        )?,
+        texel_um: field.want("texel_um", "above 0, to 100000")?.number(f64::MIN_POSITIVE, 1e5, "above 0, to 100000")?,
         size: [width, height],
     })
 }

@@ -140,7 +140,11 @@ fn dither(x: u32, y: u32) -> f32 {
 }
 
 /// One layer of R, G, B.
-pub(super) fn write_exr<S>(width: u32, height: u32, pixel: impl Fn(usize) -> (S, S, S) + Sync) -> Result<Vec<u8>, FilmError>
+pub(super) fn write_exr<S>(
+    width: u32,
+    height: u32,
+    pixel: impl Fn(usize) -> (S, S, S) + Sync,
+) -> Result<Vec<u8>, FilmError>
 where
     S: exr::prelude::IntoSample,
 {

@@ -4,10 +4,10 @@
 //! 50 mm ball, close enough that at 512 x 512 a pixel sees about 0.13 mm of paint: some flakes of a metallic are lit
 //! alone, most blend into the pixel, as on a paint chip held at arm's length.
 
+use super::RenderError;
 use super::environment::Environment;
 use super::surface::Shape;
 use super::vector::Vec3;
-use super::RenderError;
 use crate::paint::Limits;
 
 /// A scene, without its paint.

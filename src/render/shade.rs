@@ -58,7 +58,17 @@ impl Batch {
     fn new() -> Self {
         let zero = splat3([0.0; 3]);
         let (x, y, z) = (splat3([1.0, 0.0, 0.0]), splat3([0.0, 1.0, 0.0]), splat3([0.0, 0.0, 1.0]));
-        Self { count: 0, index: [0; WIDTH], point: zero, normal: z, tangent: x, side: y, eye: z, cells: [0; WIDTH], distance: Lanes::splat(1.0) }
+        Self {
+            count: 0,
+            index: [0; WIDTH],
+            point: zero,
+            normal: z,
+            tangent: x,
+            side: y,
+            eye: z,
+            cells: [0; WIDTH],
+            distance: Lanes::splat(1.0),
+        }
     }
 
     fn push(&mut self, index: u32, hit: Hit, eye: Vec3, cell: u32) {
@@ -312,7 +322,14 @@ impl Lens {
         let [width, height] = scene.size.map(|s| s as f32);
         let short = width.min(height);
         let half = [tangent * width / short, tangent * height / short];
-        Self { right, up: cross(right, forward), forward, half, pixel: [2.0 / width, 2.0 / height], pixel_size: 2.0 * tangent / short }
+        Self {
+            right,
+            up: cross(right, forward),
+            forward,
+            half,
+            pixel: [2.0 / width, 2.0 / height],
+            pixel_size: 2.0 * tangent / short,
+        }
     }
 
     /// Direction through a place in a pixel, and the place in the picture.

@@ -166,7 +166,13 @@ fn rounded_rectangle(p: [f32; 2], half: [f32; 2], corner: f32) -> (f32, [f32; 2]
     } else {
         [0.0, 1.0]
     };
-    (depth, [outward[0].copysign(p[0]) * f32::from(outward[0] != 0.0), outward[1].copysign(p[1]) * f32::from(outward[1] != 0.0)])
+    (
+        depth,
+        [
+            outward[0].copysign(p[0]) * f32::from(outward[0] != 0.0),
+            outward[1].copysign(p[1]) * f32::from(outward[1] != 0.0),
+        ],
+    )
 }
 
 /// Corners and face centres of an icosahedron in the positive octant; signs give the others.

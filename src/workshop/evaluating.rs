@@ -34,8 +34,9 @@ impl Pairs {
     ///
     /// [`WorkshopError`] for JSON that is none, too many pairs, or a vector that is not of unit length to 1e-3.
     pub fn from_json(name: &str, json: &[u8], limits: &Limits) -> Result<Self, WorkshopError> {
-        let mut pairs: Self = serde_json::from_slice(json)
-            .map_err(|e| WorkshopError::input(name, format!("{e}; accepted is {{\"pairs\": [[[ix,iy,iz],[ox,oy,oz]], …]}}")))?;
+        let mut pairs: Self = serde_json::from_slice(json).map_err(|e| {
+            WorkshopError::input(name, format!("{e}; accepted is {{\"pairs\": [[[ix,iy,iz],[ox,oy,oz]], …]}}"))
+        })?;
         if pairs.pairs.len() > limits.pairs {
             let problem = format!("{} pairs, accepted are up to {}", pairs.pairs.len(), limits.pairs);
             return Err(WorkshopError::input(name, problem));
@@ -59,9 +60,10 @@ impl Pairs {
 pub fn evaluate(paint: &CarPaint, pairs: &Pairs, chi: Chi) -> Values {
     let reflectance = Reflectance::new(paint);
     let f = pairs.pairs.iter().map(|&[wi, wo]| Some(reflectance.evaluate(wi, wo, chi))).collect();
-    let mirror = paint.coat.filter(crate::paint::Coat::is_mirror).map(|_| {
-        pairs.pairs.iter().map(|&[wi, wo]| if wi[2] > 0.0 { reflectance.mirror(wo) } else { 0.0 }).collect()
-    });
+    let mirror = paint
+        .coat
+        .filter(crate::paint::Coat::is_mirror)
+        .map(|_| pairs.pairs.iter().map(|&[wi, wo]| if wi[2] > 0.0 { reflectance.mirror(wo) } else { 0.0 }).collect());
     Values { f, mirror }
 }
 
