@@ -38,7 +38,10 @@ impl Serve {
             .init();
         let runtime =
             tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(WorkshopError::internal)?;
-        runtime.block_on(self.serve(json))
+        let served = runtime.block_on(self.serve(json));
+        // A picture that nobody waits for any more is not waited for either.
+        runtime.shutdown_background();
+        served
     }
 
     async fn serve(&self, json: bool) -> Result<(), WorkshopError> {

@@ -149,10 +149,7 @@ async fn correspond(
 
 /// Paints in the order of their physical content, and where in it the paint asked for first, second, … is.
 fn in_order_of_hashes(asked: Vec<Arc<Shelved>>) -> (Vec<Arc<Shelved>>, Vec<usize>) {
-    let key = |paint: &Arc<Shelved>| {
-        let content = paint.file_of_paint().map(|file| file.paint.content_hash().to_hex().to_string());
-        (content, paint.id.clone())
-    };
+    let key = |paint: &Arc<Shelved>| (paint.content, paint.id.clone());
     let keys: Vec<_> = asked.iter().map(key).collect();
     let mut order: Vec<usize> = (0..asked.len()).collect();
     order.sort_by(|&x, &y| keys[x].cmp(&keys[y]));

@@ -27,6 +27,10 @@ use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
 /// Longest silence in the middle of an upload.
 const SILENCE: Duration = Duration::from_secs(30);
 
+/// Longest time that a refused upload is still taken in, and most bytes of it.
+const PATIENCE: Duration = Duration::from_secs(5);
+const MOST_DRAINED: usize = 64 << 20;
+
 /// Longest name of a paint, characters.
 const LONGEST_NAME: usize = 200;
 
@@ -154,13 +158,19 @@ pub(super) fn accuracy(
 )]
 pub async fn upload(
     State(app): State<App>,
-    Query(query): Query<IngestQuery>,
+    query: Result<Query<IngestQuery>, Problem>,
     prefer: Prefer,
     request: Request,
 ) -> Result<Response, Problem> {
-    let order = query.order()?;
     let (parts, body) = request.into_parts();
-    check_headers(&app, &parts.headers)?;
+    let order = query.and_then(|Query(query)| query.order());
+    let order = match order.and_then(|order| check_headers(&app, &parts.headers).map(|()| order)) {
+        Ok(order) => order,
+        Err(problem) => {
+            let _ = tokio::time::timeout(PATIENCE, drain(body)).await;
+            return Err(problem);
+        }
+    };
     let received = receive(&app, body).await?;
     // Until a job names the upload it must not be swept as nobody's.
     let naming = app.removal.read().await;
@@ -205,6 +215,18 @@ fn check_headers(app: &App, headers: &HeaderMap) -> Result<(), Problem> {
 fn too_large(app: &App) -> Problem {
     Problem::new(Kind::TooLarge, "The upload is too large.")
         .accepting(format!("up to {} bytes", app.config.limits.bytes))
+}
+
+/// Takes in what is refused: who still sends does not listen.
+async fn drain(body: Body) {
+    let mut pieces = body.into_data_stream();
+    let mut length = 0;
+    while let Some(Ok(piece)) = pieces.next().await {
+        length += piece.len();
+        if length > MOST_DRAINED {
+            return;
+        }
+    }
 }
 
 /// Streams a body into a blob that is still to be finished.

@@ -14,7 +14,8 @@ use super::extract::{Address, Query, QueryOfTwo};
 use super::ids;
 use super::problem::{Problem, ProblemDocument};
 use super::weights::WeightQuery;
-use super::works::{Accuracy, PictureFormat, Preset, Scene, View};
+use super::works::{Accuracy, PictureFormat, Preset, Scene, View, WorkError};
+use super::workshop::profile;
 use crate::blend::RealisationWeights;
 
 /// Longest side of a picture.
@@ -64,17 +65,21 @@ impl ViewQuery {
     fn view(&self, app: &App) -> Result<View, Problem> {
         let Size(size) = self.size.unwrap_or(Size([512, 512]));
         let most = app.config.limits.samples;
-        if let Some(spp) = self.spp
-            && !(1..=most).contains(&spp)
-        {
-            return Err(Problem::parameter("spp", format!("spp is {spp}.")).accepting(format!("1 to {most}")));
-        }
-        let samples = u64::from(size[0]) * u64::from(size[1]) * u64::from(self.spp.unwrap_or(1));
-        if samples > MOST_SAMPLES {
-            let detail = format!("{} x {} pixels with this many samples each is too much.", size[0], size[1]);
+        let spp = match self.spp {
+            Some(spp) if (1..=most).contains(&spp) => spp,
+            Some(spp) => {
+                return Err(Problem::parameter("spp", format!("spp is {spp}.")).accepting(format!("1 to {most}")));
+            }
+            None => {
+                let accuracy = Accuracy { profile: self.profile.unwrap_or_default(), clusters: None };
+                profile(accuracy).map_err(|error| WorkError::from(error).of_query())?.samples_per_pixel
+            }
+        };
+        if u64::from(size[0]) * u64::from(size[1]) * u64::from(spp) > MOST_SAMPLES {
+            let detail = format!("{} x {} pixels with {spp} samples each are too much.", size[0], size[1]);
             return Err(Problem::parameter("spp", detail).accepting(format!("up to {MOST_SAMPLES} samples in all")));
         }
-        Ok(View { scene: self.scene.unwrap_or_default(), size, samples_per_pixel: self.spp })
+        Ok(View { scene: self.scene.unwrap_or_default(), size, samples_per_pixel: spp })
     }
 }
 
@@ -127,13 +132,11 @@ async fn draw(
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let view = query.view(app)?;
-    let accuracy = Accuracy { profile: query.profile.unwrap_or_default(), clusters: None };
-    let key = ids::key("preview", &(&thing.id, thing.file.to_string(), &weights, view, format, accuracy));
+    let key = ids::key("preview", &(&thing.id, thing.file.to_string(), &weights, view, format));
     let on = app.clone();
     let compute = move || async move {
         let (works, counter) = (Arc::clone(&on.works), on.metrics.previews_rendered.clone());
-        let drawn =
-            on.bench.run(move || works.preview(&thing.thing, weights.as_ref(), &view, format, accuracy)).await?;
+        let drawn = on.bench.run(move || works.preview(&thing.thing, weights.as_ref(), &view, format)).await?;
         let bytes = drawn.map_err(|error| error.of_query())?;
         counter.increment(1);
         Ok(bytes.into())

@@ -28,8 +28,8 @@ pub enum ServeError {
     /// The store.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The jobs that were under way could not be read.
-    #[error("the jobs on record could not be begun again")]
+    /// What the last process left behind could not be tidied up or gone on with.
+    #[error("the jobs on record could not be begun again; the log says why")]
     Jobs,
     /// The address.
     #[error("cannot listen on {address}: {source}")]
@@ -48,6 +48,7 @@ pub enum ServeError {
 /// [`ServeError`] when the data folder is in use, full, or not this program's.
 pub async fn open(config: ServiceConfig, works: Arc<dyn Works>) -> Result<App, ServeError> {
     let app = App::open(config, works).await?;
+    app.sweep().await.map_err(|_| ServeError::Jobs)?;
     runner::resume(&app).await.map_err(|_| ServeError::Jobs)?;
     Ok(app)
 }

@@ -88,9 +88,8 @@ impl Works for Pretend {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
-        accuracy: Accuracy,
     ) -> Result<Vec<u8>, WorkError> {
-        let paint = self.realise(thing, weights, Format::Json, accuracy)?;
+        let paint = self.realise(thing, weights, Format::Json, Accuracy::default())?;
         Ok([format!("{format:?} {view:?} ").into_bytes(), paint].concat())
     }
 

@@ -2,6 +2,7 @@
 
 mod client;
 mod house;
+mod kill;
 
 use std::time::{Duration, Instant};
 
