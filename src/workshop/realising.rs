@@ -130,7 +130,7 @@ pub fn realise(
         About { name: chosen.name.clone(), provenance: chosen.provenance.clone(), report: chosen.report.clone() };
     let bytes = match format {
         Format::Zip => export::bundle(&chosen.paint, &about, &profile.export),
-        Format::Glb => export::material_json(&chosen.paint, &about, &profile.export),
+        Format::Glb => export::glb(&chosen.paint, &about, &profile.export),
         Format::Json => export::material_json(&chosen.paint, &about, &profile.export),
         Format::Paint => {
             return Ok(Made { bytes: paint_file(&chosen).to_bytes(), report: chosen.report, notes: chosen.notes });
