@@ -6,7 +6,7 @@
 
 use std::io::Cursor;
 
-use exr::prelude::{ReadChannels, ReadLayers};
+use exr::prelude::{Compression, ReadChannels, ReadLayers};
 use image::ImageDecoder;
 
 use super::environment::{Environment, Map};
@@ -108,6 +108,11 @@ fn read_exr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
     for header in &meta.headers {
         let size = header.layer_size;
         check(size.width() as u64, size.height() as u64, limits, FORMAT)?;
+        // exr 1.74 allocates whatever a damaged DWA block claims, terabytes included, before it looks at the data.
+        if matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
+            let reason = "DWA compression is not read; store the picture with ZIP or PIZ".into();
+            return Err(EnvironmentError::Damaged { format: FORMAT, reason });
+        }
     }
     let image = exr::prelude::read()
         .no_deep_data()

@@ -5,7 +5,8 @@
 //! same light. The environment is a coarse latitude-longitude grid for the choice by facing, and finer parts of each
 //! cell for the choice by radiance alone, so that a small sun is found in a large map. A fixed set of low-discrepancy
 //! directions is drawn for each facing once per scene, and pixels pick from it; as a whole a set carries exactly the
-//! light of the grid. A small floor under the radiance keeps every direction possible.
+//! light of the grid. A small floor under the radiance keeps every direction
+//! possible, and the density follows the most radiance of a part, not its mean: none is drawn that outshines it.
 
 use std::f32::consts::{PI, TAU};
 
@@ -133,7 +134,7 @@ impl Facing {
             let terms = light.iter().zip(&seen).zip(cells);
             terms.map(|((light, seen), (_, share))| f64::from(light * seen) * share).collect()
         };
-        let columns: Vec<Search> = power(&grid.cells).chunks(WIDTH).map(Search::new).collect();
+        let columns: Vec<Search> = power(&grid.bounds).chunks(WIDTH).map(Search::new).collect();
         let rows = Search::new(&columns.iter().map(Search::total).collect::<Vec<_>>());
         let sphere = 4.0 * std::f64::consts::PI;
         let scale_of = (1.0 / (rows.total() * sphere)) as f32;
@@ -158,8 +159,7 @@ impl Facing {
             }
         }
         // The set as a whole carries the light of the grid: what few directions miss between them is shared out.
-        let bare: Vec<f32> = grid.cells.iter().map(|light| light - grid.floor).collect();
-        let light: f64 = power(&bare).iter().sum::<f64>() * sphere;
+        let light: f64 = power(&grid.cells).iter().sum::<f64>() * sphere;
         let correction = (light * samples.len() as f64 / drawn) as f32;
         if correction.is_finite() {
             for sample in &mut samples {
@@ -171,68 +171,68 @@ impl Facing {
     }
 }
 
-/// Mean luminance by direction: coarse cells, and finer parts of each.
+/// Luminance by direction: coarse cells, and finer parts of each.
 #[derive(Clone, Debug)]
 struct Grid {
-    /// Row by row, with the floor.
+    /// Mean luminance, row by row.
     cells: Vec<f32>,
     fine: usize,
-    /// Cell by cell, `fine` rows of `fine`, with the floor.
+    /// Most luminance, cell by cell, `fine` rows of `fine`; with the floor.
     parts: Vec<f32>,
-    floor: f32,
+    /// Mean of a cell's parts.
+    bounds: Vec<f32>,
 }
 
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
 impl Grid {
     fn new(environment: &Environment) -> Self {
-        let fine = match environment.source() {
-            Source::Uniform(_) => 1,
-            Source::Studio(_) => 4,
-            Source::Map(map) => map.width.div_ceil(WIDTH).max(map.height.div_ceil(HEIGHT)).clamp(1, FINEST),
+        // Parts are no smaller than a map's pixels, and are looked at as finely as those.
+        let (fine, dense) = match environment.source() {
+            Source::Uniform(_) => (1, 1),
+            Source::Studio(_) => (4, 1),
+            Source::Map(map) => {
+                let fine = map.width.div_ceil(WIDTH).max(map.height.div_ceil(HEIGHT)).clamp(1, FINEST);
+                (fine, map.width.div_ceil(WIDTH * fine).max(map.height.div_ceil(HEIGHT * fine)))
+            }
         };
-        // Parts smaller than a map's pixels read it bilinearly at their middle; larger ones average the pixels inside.
-        let dense = match environment.source() {
-            Source::Map(map) => (map.width.div_ceil(WIDTH * fine)).max(map.height.div_ceil(HEIGHT * fine)),
-            Source::Studio(_) | Source::Uniform(_) => 1,
+        let light = |u: f32, v: f32| match environment.source() {
+            Source::Map(map) => luminance(map.at(u, v)),
+            Source::Studio(_) | Source::Uniform(_) => luminance(environment.radiance(Map::direction(u, v))),
         };
-        let parts: Vec<f32> = (0..WIDTH * HEIGHT)
+        let found: Vec<(f32, f32)> = (0..WIDTH * HEIGHT * fine * fine)
             .into_par_iter()
-            .flat_map_iter(|cell| {
-                (0..fine * fine).map(move |part| {
-                    let corner = [(cell % WIDTH * fine + part % fine), (cell / WIDTH * fine + part / fine)];
-                    let mut sum = 0.0;
-                    for k in 0..dense * dense {
-                        let place = |c: usize, s: usize| c as f32 + (s as f32 + 0.5) / dense as f32;
-                        let u = place(corner[0], k % dense) / (WIDTH * fine) as f32;
-                        let v = place(corner[1], k / dense) / (HEIGHT * fine) as f32;
-                        sum += luminance(environment.radiance(Map::direction(u, v)));
-                    }
-                    sum / (dense * dense) as f32
-                })
+            .map(|k| {
+                let (cell, part) = (k / (fine * fine), k % (fine * fine));
+                let corner = [cell % WIDTH * fine + part % fine, cell / WIDTH * fine + part / fine];
+                // The trapezoidal rule at the corners, edges and middle of each pixel: exact for bilinear light.
+                let (mut sum, mut most) = (0.0, 0.0_f32);
+                let last = 2 * dense;
+                for (row, column) in (0..=last).flat_map(|r| (0..=last).map(move |c| (r, c))) {
+                    let place = |corner: usize, k: usize| corner as f32 + k as f32 / last as f32;
+                    let u = place(corner[0], column) / (WIDTH * fine) as f32;
+                    let v = place(corner[1], row) / (HEIGHT * fine) as f32;
+                    let share = |k: usize| if k == 0 || k == last { 0.5 } else { 1.0 };
+                    let here = light(u, v);
+                    sum += here * share(row) * share(column);
+                    most = most.max(here);
+                }
+                (sum / (last * last) as f32, most)
             })
             .collect();
-        let mut grid = Self { cells: Vec::new(), fine, parts, floor: 0.0 };
-        grid.sum_parts();
-        grid
+        let each = fine * fine;
+        let mean = |parts: &[(f32, f32)]| parts.iter().map(|p| p.0).sum::<f32>() / each as f32;
+        let cells = found.chunks(each).map(mean).collect();
+        Self { cells, fine, parts: found.into_iter().map(|p| p.1).collect(), bounds: Vec::new() }
     }
 
-    fn sum_parts(&mut self) {
-        let each = self.fine * self.fine;
-        let mean = |parts: &[f32]| {
-            // Parts of a cell by the share of it that their row has.
-            let rows = parts.chunks(self.fine).map(|row| row.iter().sum::<f32>() / self.fine as f32);
-            rows.sum::<f32>() / self.fine as f32
-        };
-        self.cells = self.parts.chunks(each).map(mean).collect();
-    }
-
-    /// Adds the floor; the mean luminance of the sphere before that.
+    /// Adds the floor to the parts; the mean luminance of the sphere.
     fn raise_floor(&mut self) -> f64 {
         let mean: f64 = self.cells.iter().enumerate().map(|(k, &light)| f64::from(light) * Self::share(k)).sum();
-        self.floor = FLOOR * mean as f32;
-        for light in self.cells.iter_mut().chain(&mut self.parts) {
-            *light += self.floor;
+        let each = self.fine * self.fine;
+        for light in &mut self.parts {
+            *light += FLOOR * mean as f32;
         }
+        self.bounds = self.parts.chunks(each).map(|parts| parts.iter().sum::<f32>() / each as f32).collect();
         mean
     }
 
