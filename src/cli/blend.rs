@@ -49,8 +49,8 @@ impl Blend {
         if let Some(timings) = &self.timings {
             let seconds = json!({
                 "ingest": read.as_secs_f64(),
-                "blend": (blended - read).as_secs_f64(),
-                "write": (written - blended).as_secs_f64(),
+                "blend": blended.saturating_sub(read).as_secs_f64(),
+                "write": written.saturating_sub(blended).as_secs_f64(),
                 "total": written.as_secs_f64(),
             });
             output::replace(timings, seconds.to_string().as_bytes())?;

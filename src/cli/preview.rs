@@ -93,8 +93,8 @@ impl Preview {
             let written = start.elapsed();
             let seconds = json!({
                 "open": opened.as_secs_f64(),
-                "draw": (drawn - opened).as_secs_f64(),
-                "write": (written - drawn).as_secs_f64(),
+                "draw": drawn.saturating_sub(opened).as_secs_f64(),
+                "write": written.saturating_sub(drawn).as_secs_f64(),
                 "total": written.as_secs_f64(),
             });
             output::replace(timings, seconds.to_string().as_bytes())?;

@@ -71,23 +71,21 @@ fn print_tree(value: &Value, depth: usize) {
     match value {
         Value::Object(map) => {
             for (key, value) in map {
-                match inline(value) {
-                    Some(text) => println!("{pad}{key}: {text}"),
-                    None => {
-                        println!("{pad}{key}:");
-                        print_tree(value, depth + 1);
-                    }
+                if let Some(text) = inline(value) {
+                    println!("{pad}{key}: {text}");
+                } else {
+                    println!("{pad}{key}:");
+                    print_tree(value, depth + 1);
                 }
             }
         }
         Value::Array(list) => {
             for value in list {
-                match inline(value) {
-                    Some(text) => println!("{pad}- {text}"),
-                    None => {
-                        println!("{pad}-");
-                        print_tree(value, depth + 1);
-                    }
+                if let Some(text) = inline(value) {
+                    println!("{pad}- {text}");
+                } else {
+                    println!("{pad}-");
+                    print_tree(value, depth + 1);
                 }
             }
         }

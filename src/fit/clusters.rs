@@ -227,7 +227,7 @@ impl Clusterer {
     /// [`NoTexel`] when no pixel is finite.
     pub fn cluster(&mut self, planes: [&[f32]; 3], settings: &ClusterSettings) -> Result<SliceClusters, NoTexel> {
         let pixels = planes[0].len();
-        let (dead, beyond) = self.to_lab(planes);
+        let (dead, beyond) = self.take_in(planes);
         if self.texels.is_empty() {
             return Err(NoTexel { pixels });
         }
@@ -242,7 +242,7 @@ impl Clusterer {
     }
 
     /// Fills `texels` with the finite pixels; returns how many were not, and how many lay beyond the bounds.
-    fn to_lab(&mut self, planes: [&[f32]; 3]) -> (usize, usize) {
+    fn take_in(&mut self, planes: [&[f32]; 3]) -> (usize, usize) {
         let [red, green, blue] = planes;
         self.texels.clear();
         self.texels.resize(red.len(), [0.0; 4]);
@@ -441,10 +441,8 @@ fn split_buckets(starts: &[usize], sums: &[Sums], low: usize, high: usize) -> Op
 fn partition(texels: &mut [Texel], axis: usize, pivot: f32) -> usize {
     let mut below = 0;
     for k in 0..texels.len() {
-        let texel = texels[k];
-        texels[k] = texels[below];
-        texels[below] = texel;
-        below += usize::from(texel[axis] < pivot);
+        texels.swap(k, below);
+        below += usize::from(texels[below][axis] < pivot);
     }
     below
 }

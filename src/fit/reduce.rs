@@ -9,6 +9,9 @@ use rayon::prelude::*;
 use crate::color::LinearRgb;
 use crate::paint::{Flakes, Slice, center_of_mean, mean_color};
 
+/// Probability and corners of a finished cluster.
+type Boxed = (f64, [f32; 3], [f32; 3]);
+
 /// A cluster on its way: mass, moments in Lab, mean in linear light.
 #[derive(Clone, Copy, Debug)]
 struct Heap {
@@ -23,7 +26,7 @@ struct Heap {
 /// The same flakes with at most `most` clusters in each slice. Slices that have no more stay as they are.
 #[must_use]
 pub fn reduce_clusters(flakes: &Flakes, most: usize) -> Flakes {
-    let slices: Vec<Vec<(f64, [f32; 3], [f32; 3])>> =
+    let slices: Vec<Vec<Boxed>> =
         (0..flakes.slices()).into_par_iter().map(|k| reduce_slice(&flakes.slice_at(k), most.max(1))).collect();
     let mut reduced = Flakes {
         theta_h: flakes.theta_h.clone(),
@@ -45,7 +48,7 @@ pub fn reduce_clusters(flakes: &Flakes, most: usize) -> Flakes {
     reduced
 }
 
-fn reduce_slice(slice: &Slice<'_>, most: usize) -> Vec<(f64, [f32; 3], [f32; 3])> {
+fn reduce_slice(slice: &Slice<'_>, most: usize) -> Vec<Boxed> {
     let mut heaps: Vec<Heap> = (0..slice.probability.len()).map(|k| Heap::of(slice, k)).collect();
     while heaps.len() > most {
         merge_nearest(&mut heaps, most);
@@ -88,7 +91,7 @@ impl Heap {
         }
     }
 
-    fn boxed(&self) -> (f64, [f32; 3], [f32; 3]) {
+    fn boxed(&self) -> Boxed {
         if let Some((lower, upper)) = self.own {
             return (self.mass, lower, upper);
         }

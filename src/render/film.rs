@@ -120,7 +120,9 @@ impl Film {
                         // Exposed here: the sheet has one exposure, its pictures may differ.
                         Some(film) => pixels.extend(film.pixels[range].iter().map(|p| p.map(|v| v * film.exposure))),
                         // An empty place takes the first picture's background.
-                        None => pixels.extend(range.map(|k| first.pixels[k / w as usize * w as usize].map(|v| v * first.exposure))),
+                        None => pixels.extend(
+                            range.map(|k| first.pixels[k / w as usize * w as usize].map(|v| v * first.exposure)),
+                        ),
                     }
                 }
             }

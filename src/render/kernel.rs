@@ -333,7 +333,8 @@ mod tests {
 
     fn paint(coat: Option<Coat>) -> CarPaint {
         let grid = |d: &[f64]| AngleGrid::new(d.to_vec()).expect("ascending");
-        let nodes = (0..12).map(|k| Lab { l: 95.0 - 6.0 * f64::from(k), a: 20.0 - f64::from(k), b: 4.0 * f64::from(k) });
+        let nodes =
+            (0..12).map(|k| Lab { l: 95.0 - 6.0 * f64::from(k), a: 20.0 - f64::from(k), b: 4.0 * f64::from(k) });
         let (rows, columns) = (grid(&[0.0, 7.0, 25.0, 60.0]), grid(&[0.0, 20.0, 66.0]));
         let overall = Lab { l: 70.0, a: 0.0, b: 0.0 };
         CarPaint {
@@ -405,7 +406,9 @@ mod tests {
             let points = super::super::points::Points::of_pixel(0, 0, 1 << 16, 5);
             let mut sum = 0.0_f64;
             for k in 0..1 << 16 {
-                let Some(light) = kernel.sample::<true>(&view, 0, points.pair(k, 1)[0], points.pair(k, 0)) else { continue };
+                let Some(light) = kernel.sample::<true>(&view, 0, points.pair(k, 1)[0], points.pair(k, 0)) else {
+                    continue;
+                };
                 let light = splat3(light);
                 let answer = kernel.evaluate::<true, false>(&view, light, &[0; WIDTH], Lanes::splat(1.0));
                 sum += f64::from(light[2].0[0] / answer.density.0[0]);

@@ -220,7 +220,8 @@ mod tests {
     fn flakes_add_their_mean_however_few_samples_see_them() {
         let mean = |samples| {
             let film = film(&sparkling(), &scene(48, samples));
-            let middle: Vec<f32> = (14..34).flat_map(|y| (14..34).map(move |x| y * 48 + x)).map(|k| film.pixels()[k][1]).collect();
+            let middle: Vec<f32> =
+                (14..34).flat_map(|y| (14..34).map(move |x| y * 48 + x)).map(|k| film.pixels()[k][1]).collect();
             #[allow(clippy::cast_precision_loss)]
             let mean = middle.iter().sum::<f32>() / middle.len() as f32;
             mean

@@ -105,7 +105,7 @@ pub(super) async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended,
     for paint in &paints {
         shelved.push(app.paint(paint).await?);
     }
-    let (canonical, places) = in_order_of_hashes(shelved);
+    let (canonical, places) = in_order_of_hashes(&shelved);
     let names: Vec<&str> = canonical.iter().map(|paint| paint.id.as_str()).collect();
     let key = ids::key("blend", &(&names, accuracy));
     // Whichever order is asked for first finds the correspondence, the others wait for it.
@@ -142,13 +142,13 @@ async fn correspond(
     let Ok(found) = found.await? else {
         return Err(Problem::new(Kind::JobCancelled, "The job that found this correspondence was cancelled."));
     };
-    let file = found.map_err(|error| error.of_body())?;
+    let file = found.map_err(super::works::WorkError::of_body)?;
     app.metrics.blends_computed.increment(1);
     Ok(file)
 }
 
 /// Paints in the order of their physical content, and where in it the paint asked for first, second, … is.
-fn in_order_of_hashes(asked: Vec<Arc<Shelved>>) -> (Vec<Arc<Shelved>>, Vec<usize>) {
+fn in_order_of_hashes(asked: &[Arc<Shelved>]) -> (Vec<Arc<Shelved>>, Vec<usize>) {
     let key = |paint: &Arc<Shelved>| (paint.content, paint.id.clone());
     let keys: Vec<_> = asked.iter().map(key).collect();
     let mut order: Vec<usize> = (0..asked.len()).collect();

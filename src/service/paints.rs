@@ -277,7 +277,7 @@ pub(super) async fn ingest(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended
         fitted.map_err(|error| error.without(&folder))
     });
     let Ok(fitted) = fitted.await? else { return Ok(Err(CalledOff)) };
-    let file = fitted.map_err(|error| error.of_upload())?;
+    let file = fitted.map_err(super::works::WorkError::of_upload)?;
     app.metrics.paints_fitted.increment(1);
     under_way.stage("storing");
     app.keep_paint(id, file, Some(upload)).await.map(Ok)

@@ -137,7 +137,7 @@ async fn draw(
     let compute = move || async move {
         let (works, counter) = (Arc::clone(&on.works), on.metrics.previews_rendered.clone());
         let drawn = on.bench.run(move || works.preview(&thing.thing, weights.as_ref(), &view, format)).await?;
-        let bytes = drawn.map_err(|error| error.of_query())?;
+        let bytes = drawn.map_err(super::works::WorkError::of_query)?;
         counter.increment(1);
         Ok(bytes.into())
     };

@@ -172,7 +172,7 @@ struct Text<'a> {
     text: &'a str,
 }
 
-impl<'de> IntoDeserializer<'de, Refusal> for Text<'_> {
+impl IntoDeserializer<'_, Refusal> for Text<'_> {
     type Deserializer = Self;
 
     fn into_deserializer(self) -> Self {

@@ -86,7 +86,7 @@ async fn realise(
     let compute = move || async move {
         let (works, counter) = (Arc::clone(&on.works), on.metrics.realisations_computed.clone());
         let made = on.bench.run(move || works.realise(&thing.thing, weights.as_ref(), format, accuracy)).await?;
-        let bytes = made.map_err(|error| error.of_query())?;
+        let bytes = made.map_err(super::works::WorkError::of_query)?;
         counter.increment(1);
         Ok(bytes.into())
     };

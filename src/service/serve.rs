@@ -54,7 +54,6 @@ pub async fn open(config: ServiceConfig, works: Arc<dyn Works>) -> Result<App, S
 }
 
 /// All addresses.
-#[must_use]
 pub fn router(app: App) -> Router {
     Router::new()
         .route("/v1/paints", get(paints::list).post(paints::upload))

@@ -21,7 +21,7 @@ pub struct Prefer {
 }
 
 /// Longest wait that is granted.
-const LONGEST: Duration = Duration::from_secs(300);
+const LONGEST: Duration = Duration::from_mins(5);
 
 /// Wait of a caller who has no preference: quick work is answered at once, and so are quick refusals.
 const UNASKED: Duration = Duration::from_secs(3);

@@ -48,7 +48,7 @@ impl Program {
         loop {
             let told = self.get(job).await.json();
             match told["state"].as_str() {
-                Some("queued" | "running") if begun.elapsed() < Duration::from_secs(60) => {}
+                Some("queued" | "running") if begun.elapsed() < Duration::from_mins(1) => {}
                 Some("done") => return told,
                 _ => panic!("{told}"),
             }
