@@ -83,7 +83,8 @@ pub fn evaluate_raw(measurement: &Measurement, pairs: &Pairs) -> Result<Values, 
 
 fn raw_package(package: &Package, pairs: &Pairs) -> Result<Vec<Option<[f64; 3]>>, WorkshopError> {
     let wrong = |problem: &dyn std::fmt::Display| WorkshopError::input(&package.name, problem);
-    let means = package.flakes.as_ref().map(|slices| slices.mean_colors()).transpose().map_err(|e| wrong(&e))?;
+    let means =
+        package.flakes.as_ref().map(crate::measurement::FlakeSlices::mean_colors).transpose().map_err(|e| wrong(&e))?;
     let flakes = |half: &HalfAngles| match (&package.flakes, &means) {
         (Some(slices), Some(means)) => at_angles(means, slices.theta_h(), slices.theta_d(), half),
         _ => [0.0; 3],

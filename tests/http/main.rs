@@ -56,7 +56,11 @@ async fn an_upload_becomes_a_paint_that_can_be_read_taken_back_and_deleted() {
     house.close().await;
 }
 
+/// A request and what refuses it: method, address, content type, body; status, kind, pointer.
+type Refusal<'a> = (&'a str, String, &'a str, Vec<u8>, u16, &'a str, Option<&'a str>);
+
 #[tokio::test(flavor = "multi_thread")]
+#[allow(clippy::too_many_lines)] // one line a refusal
 async fn every_refusal_is_a_problem_that_says_where_and_what_instead() {
     let data = folder();
     let mut config = ServiceConfig::new(data.path().to_owned());
@@ -69,8 +73,7 @@ async fn every_refusal_is_a_problem_that_says_where_and_what_instead() {
     let json = |value: serde_json::Value| value.to_string().into_bytes();
     let large = vec![b's'; 5_000_001];
 
-    // Method, address, content type, body, and what is answered: status, kind, pointer.
-    let table: Vec<(&str, String, &str, Vec<u8>, u16, &str, Option<&str>)> = vec![
+    let table: Vec<Refusal<'_>> = vec![
         ("GET", "/v1/nowhere".into(), "", vec![], 404, "unknown-address", None),
         ("GET", "/v1/paints/p_nope".into(), "", vec![], 404, "unknown-paint", None),
         ("GET", format!("/v1/paints/{nobody}"), "", vec![], 404, "unknown-paint", None),
