@@ -1,6 +1,6 @@
 //! Real `.bsdf` files against an independent evaluator.
 //!
-//! `rgl/expected.json` in the data folder holds what Mitsuba 3.9.1's `measured` plugin (scalar_rgb) gives for four
+//! `rgl/expected.json` in the data folder holds what Mitsuba 3.9.1's `measured` plugin (`scalar_rgb`) gives for four
 //! CC0 materials at 60 direction pairs. Data is looked for in `CARPAINT_DATA`, by default `../shared`; without it the
 //! test says so and passes, except where `CI` is set.
 

@@ -44,7 +44,7 @@ fn paint(seed: u32, theta_h: &[f64], theta_d: &[f64]) -> CarPaint {
     }
     let nodes = (0..4).map(|_| Lab { l: 40.0 + 50.0 * next(), a: 30.0 * next(), b: -30.0 * next() }).collect();
     CarPaint {
-        coat: (seed % 3 != 0).then(|| Coat { ior: 1.4 + 0.2 * next(), roughness: 0.02, thickness_um: None }),
+        coat: (!seed.is_multiple_of(3)).then(|| Coat { ior: 1.4 + 0.2 * next(), roughness: 0.02, thickness_um: None }),
         diffuse: [next(), next(), next()],
         lobes: (0..3)
             .map(|k| Lobe {

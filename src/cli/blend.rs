@@ -6,8 +6,8 @@ use std::time::Instant;
 use clap::Args;
 use serde_json::json;
 
-use super::output;
 use super::ingest::ReadingArgs;
+use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
 use crate::workshop::{WorkshopError, blend_paints, open_paint};
@@ -49,8 +49,8 @@ impl Blend {
         if let Some(timings) = &self.timings {
             let seconds = json!({
                 "ingest": read.as_secs_f64(),
-                "blend": (blended - read).as_secs_f64(),
-                "write": (written - blended).as_secs_f64(),
+                "blend": blended.saturating_sub(read).as_secs_f64(),
+                "write": written.saturating_sub(blended).as_secs_f64(),
                 "total": written.as_secs_f64(),
             });
             output::replace(timings, seconds.to_string().as_bytes())?;
@@ -58,7 +58,9 @@ impl Blend {
         let report = made.blend.report();
         if json {
             let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
-            return output::print_json(&json!({ "out": self.out, "paints": names, "correspondence": report, "notes": made.notes }));
+            return output::print_json(
+                &json!({ "out": self.out, "paints": names, "correspondence": report, "notes": made.notes }),
+            );
         }
         for note in &made.notes {
             eprintln!("note: {note}");

@@ -61,8 +61,8 @@ impl Evaluate {
             if matches!(thing, Thing::Paint(_)) {
                 refuse_weights(&self.weights)?;
             }
-            let realised = thing
-                .realise(|blend| self.weights.for_blend(blend.ingredients().map(|(name, _)| name)).map(Some))?;
+            let realised =
+                thing.realise(|blend| self.weights.for_blend(blend.ingredients().map(|(name, _)| name)).map(Some))?;
             evaluate(&realised.paint, &pairs, chi)
         };
         let mut bytes = serde_json::to_vec(&values).map_err(WorkshopError::internal)?;

@@ -38,7 +38,7 @@ pub struct ReadingArgs {
     /// What the file is, where it should not be recognised from its contents.
     #[arg(long, value_enum, value_name = "LAYOUT")]
     layout: Option<LayoutName>,
-    /// Spacing of theta_h in an MPI 2005 table.
+    /// Spacing of the half angle in an MPI 2005 table.
     #[arg(long, value_enum, value_name = "SPACING")]
     theta_h: Option<SpacingName>,
     /// Bytes before the values of an MPI 2005 table, 84 unless given.
@@ -98,7 +98,8 @@ impl Ingest {
         let path = match find(&self.input)? {
             Source::Path(path) => path,
             Source::Sample(sample) => {
-                let hint = format!("a sample is no measurement; 'carpaint samples export {}' writes its .paint", sample.name);
+                let hint =
+                    format!("a sample is no measurement; 'carpaint samples export {}' writes its .paint", sample.name);
                 return Err(WorkshopError::input(&self.input, hint));
             }
         };

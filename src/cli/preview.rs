@@ -75,7 +75,8 @@ impl Preview {
             Thing::Paint(_) => refuse_weights(&self.weights).map(|()| None)?,
             Thing::Blend(blend) => Some(self.weights.for_blend(blend.ingredients().map(|(name, _)| name))?),
         };
-        let environment = self.environment.as_deref().map(|path| read_environment(path, &options.limits)).transpose()?;
+        let environment =
+            self.environment.as_deref().map(|path| read_environment(path, &options.limits)).transpose()?;
         let opened = start.elapsed();
         let wanted = PreviewOptions {
             scene: self.scene.clone(),
@@ -92,8 +93,8 @@ impl Preview {
             let written = start.elapsed();
             let seconds = json!({
                 "open": opened.as_secs_f64(),
-                "draw": (drawn - opened).as_secs_f64(),
-                "write": (written - drawn).as_secs_f64(),
+                "draw": drawn.saturating_sub(opened).as_secs_f64(),
+                "write": written.saturating_sub(drawn).as_secs_f64(),
                 "total": written.as_secs_f64(),
             });
             output::replace(timings, seconds.to_string().as_bytes())?;

@@ -36,11 +36,12 @@ impl Serve {
                 tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "carpaint=info".into()),
             )
             .init();
-        let runtime = tokio::runtime::Builder::new_multi_thread()
-            .enable_all()
-            .build()
-            .map_err(WorkshopError::internal)?;
-        runtime.block_on(self.serve(json))
+        let runtime =
+            tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(WorkshopError::internal)?;
+        let served = runtime.block_on(self.serve(json));
+        // A picture that nobody waits for any more is not waited for either.
+        runtime.shutdown_background();
+        served
     }
 
     async fn serve(&self, json: bool) -> Result<(), WorkshopError> {

@@ -56,7 +56,11 @@ pub fn one_line(paint: &PaintFile) -> String {
         ));
     }
     if let Some(r) = &paint.residuals {
-        parts.push(format!("luminance error {:.1} % (floor {:.1} %)", 100.0 * r.all.median, 100.0 * r.all.floor_median));
+        parts.push(format!(
+            "luminance error {:.1} % (floor {:.1} %)",
+            100.0 * r.all.median,
+            100.0 * r.all.floor_median
+        ));
     }
     parts.join(" · ")
 }
@@ -67,23 +71,21 @@ fn print_tree(value: &Value, depth: usize) {
     match value {
         Value::Object(map) => {
             for (key, value) in map {
-                match inline(value) {
-                    Some(text) => println!("{pad}{key}: {text}"),
-                    None => {
-                        println!("{pad}{key}:");
-                        print_tree(value, depth + 1);
-                    }
+                if let Some(text) = inline(value) {
+                    println!("{pad}{key}: {text}");
+                } else {
+                    println!("{pad}{key}:");
+                    print_tree(value, depth + 1);
                 }
             }
         }
         Value::Array(list) => {
             for value in list {
-                match inline(value) {
-                    Some(text) => println!("{pad}- {text}"),
-                    None => {
-                        println!("{pad}-");
-                        print_tree(value, depth + 1);
-                    }
+                if let Some(text) = inline(value) {
+                    println!("{pad}- {text}");
+                } else {
+                    println!("{pad}-");
+                    print_tree(value, depth + 1);
                 }
             }
         }
@@ -95,7 +97,9 @@ fn inline(value: &Value) -> Option<String> {
     match value {
         Value::Null => Some("none".to_owned()),
         Value::Bool(yes) => Some(if *yes { "yes" } else { "no" }.to_owned()),
-        Value::Number(n) => Some(n.as_f64().filter(|_| !n.is_u64()).map_or_else(|| n.to_string(), |v| format!("{v:.5}"))),
+        Value::Number(n) => {
+            Some(n.as_f64().filter(|_| !n.is_u64()).map_or_else(|| n.to_string(), |v| format!("{v:.5}")))
+        }
         Value::String(text) => Some(text.clone()),
         Value::Array(list) if list.is_empty() => Some("none".to_owned()),
         Value::Array(list) if list.iter().all(Value::is_number) => {

@@ -43,17 +43,14 @@ pub(super) fn halves(
         *value = value.clamp(-HALF_MAX, HALF_MAX);
     }
     if count > 0 {
-        match clamped.iter_mut().find(|c| c.what == what) {
-            Some(known) => {
-                known.count += count;
-                if f64::from(farthest.abs()) > known.farthest.abs() {
-                    known.farthest = f64::from(farthest);
-                }
+        if let Some(known) = clamped.iter_mut().find(|c| c.what == what) {
+            known.count += count;
+            if f64::from(farthest.abs()) > known.farthest.abs() {
+                known.farthest = f64::from(farthest);
             }
-            None => {
-                let (farthest, limit) = (f64::from(farthest), f64::from(HALF_MAX));
-                clamped.push(Clamped { what, count, farthest, limit });
-            }
+        } else {
+            let (farthest, limit) = (f64::from(farthest), f64::from(HALF_MAX));
+            clamped.push(Clamped { what, count, farthest, limit });
         }
     }
     let mut out = vec![f16::ZERO; values.len()];

@@ -162,7 +162,7 @@ pub(super) fn document(
 
 fn inline(file: &str, bytes: &[u8]) -> String {
     use base64::Engine;
-    let kind = if file.ends_with(".png") { "png" } else { "x-exr" };
+    let kind = if std::path::Path::new(file).extension().is_some_and(|e| e == "png") { "png" } else { "x-exr" };
     let mut out = format!("data:image/{kind};base64,");
     base64::engine::general_purpose::STANDARD.encode_string(bytes, &mut out);
     out

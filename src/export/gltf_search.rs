@@ -81,7 +81,7 @@ fn bind(problem: &impl Problem, free: &[f64], x: &mut [f64]) {
     }
 }
 
-/// Solves (JᵀJ + λ diag) step = −Jᵀr by Cholesky's decomposition; `None` when it is not positive.
+/// Solves `(JᵀJ + λ diag) step = −Jᵀr` by Cholesky's decomposition; `None` when it is not positive.
 fn damped_step(columns: &[Vec<f64>], residuals: &[f64], damping: f64) -> Option<Vec<f64>> {
     let n = columns.len();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();

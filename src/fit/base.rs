@@ -4,11 +4,9 @@
 //! brings the result clearly nearer to the measurement, or when the bare fit misses its aim and the coat helps:
 //! a second, wide lobe must not become a coat for a per cent.
 
-use std::f64::consts::PI;
-
 use super::color_table::{Frame, fit_color_table};
 use super::directions::{Sample, TRUSTED_DEG, measure};
-use super::lobes::{CoatSearch, LOBES, Shape, fit_shape, unit_of};
+use super::lobes::{CoatSearch, Shape, fit_shape, unit_of};
 use super::residual::{Judge, Percentiles};
 use crate::color::LinearRgb;
 use crate::measurement::MeasuredBrdf;
@@ -20,6 +18,10 @@ const SAMPLES: usize = 8000;
 const LEAST_SAMPLES: usize = 200;
 /// What the logarithm of all errors together must fall by for a coat to be taken.
 const COAT_GAIN: f64 = 0.2;
+/// What it must fall by for a coat that is as smooth and dense as a clear coat.
+const COAT_GAIN_IF_CLEAR: f64 = 0.05;
+const CLEAR_ROUGHNESS: f64 = 0.1;
+const CLEAR_IOR: f64 = 1.3;
 /// What it must fall by where the bare fit misses [`AIM`].
 const COAT_GAIN_IN_NEED: f64 = 0.03;
 /// Error against the floor that a fit aims at.
@@ -109,7 +111,7 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
         CoatChoice::Ior(ior) | CoatChoice::Inside(ior) if !(1.0..=4.0).contains(&ior) => {
             return Err(FitError::Ior(ior));
         }
-        CoatChoice::Ior(ior) if ior == 1.0 => (Frame::Air, vec![CoatSearch::Bare]),
+        CoatChoice::Ior(1.0) => (Frame::Air, vec![CoatSearch::Bare]),
         CoatChoice::Ior(ior) => (Frame::Air, vec![CoatSearch::Index(ior)]),
         CoatChoice::Inside(ior) => (Frame::Inside(ior), vec![CoatSearch::Bare]),
     };
@@ -128,16 +130,23 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
     let unit = unit_of(&samples);
     let judge = Judge::new(measured, frame, unit);
     let floors = judge.floor_errors();
-    let mut candidates = Vec::new();
+    let mut candidates: Vec<Candidate> = Vec::new();
     for search in searches {
-        let Some(shape) = fit_shape(&samples, search, unit) else { continue };
+        let bare = candidates.first().map(|c| &c.shape);
+        let Some(shape) = fit_shape(&samples, search, unit, bare) else { continue };
         candidates.push(candidate(measured, frame, shape, &samples, unit, &judge, &floors));
     }
     let mut candidates = candidates.into_iter();
     let mut best = candidates.next().ok_or(FitError::NoAnswer)?;
     for other in candidates {
         let gain = best.score - other.score;
-        if gain > COAT_GAIN || (best.worst > AIM && gain > COAT_GAIN_IN_NEED) {
+        let clear = other.shape.coat.is_some_and(|(ior, roughness)| roughness <= CLEAR_ROUGHNESS && ior >= CLEAR_IOR);
+        let needed = match () {
+            () if best.worst > AIM => COAT_GAIN_IN_NEED,
+            () if clear => COAT_GAIN_IF_CLEAR,
+            () => COAT_GAIN,
+        };
+        if gain > needed {
             best = other;
         }
     }
@@ -186,13 +195,13 @@ fn paint_of(shape: &Shape, color_table: ColorTable) -> CarPaint {
 }
 
 fn finish(best: Candidate, judge: &Judge) -> Result<FittedBase, FitError> {
-    let mut shape = best.shape;
-    for (field, value) in [("diffuse", shape.diffuse)].into_iter().chain(shape.lobes.map(|l| ("a lobe's weight", l.0))) {
+    let shape = best.shape;
+    for (field, value) in [("diffuse", shape.diffuse)].into_iter().chain(shape.lobes.map(|l| ("a lobe's weight", l.0)))
+    {
         if !(0.0..=MAX_WEIGHT).contains(&value) {
             return Err(FitError::NotAReflectance { field, value });
         }
     }
-    drop_what_does_not_show(&mut shape);
     let mut warnings = Vec::new();
     if shape.agreeing < 2 {
         warnings.push(format!(
@@ -221,18 +230,6 @@ fn finish(best: Candidate, judge: &Judge) -> Result<FittedBase, FitError> {
     Ok(FittedBase { diffuse, lobes, color_table, coat, residuals, warnings })
 }
 
-/// Lobes that nowhere reach a ten-thousandth of the rest's peak get weight 0.
-fn drop_what_does_not_show(shape: &mut Shape) {
-    // At grazing the Fresnel value goes to 1, whatever it is at normal incidence.
-    let peaks = shape.lobes.map(|(s, alpha, _)| s / (PI * alpha * alpha));
-    let total = shape.diffuse / PI + peaks.iter().sum::<f64>();
-    for k in 0..LOBES {
-        if peaks[k] < 1e-4 * (total - peaks[k]) {
-            shape.lobes[k].0 = 0.0;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -248,7 +245,10 @@ mod tests {
 
     /// A number in 0..1 that depends on both directions and nothing else.
     fn noise(wi: Direction, wo: Direction) -> f64 {
-        let bits = wi.iter().chain(&wo).fold(0_u64, |h, v| (h ^ v.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29));
+        let bits = wi
+            .iter()
+            .chain(&wo)
+            .fold(0_u64, |h, v| (h ^ v.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29));
         f64::from(u32::try_from(bits >> 40).expect("24 bits")) / f64::from(1_u32 << 24)
     }
 
@@ -260,8 +260,11 @@ mod tests {
 
     fn peak_and_flop(base: &FittedBase) -> [f64; 2] {
         let paint = CarPaint {
-            coat: base.coat, diffuse: base.diffuse, lobes: base.lobes.clone(),
-            color_table: base.color_table.clone(), flakes: None,
+            coat: base.coat,
+            diffuse: base.diffuse,
+            lobes: base.lobes.clone(),
+            color_table: base.color_table.clone(),
+            flakes: None,
         };
         let r = Reflectance::new(&paint);
         let at = |deg: f64| {
@@ -312,7 +315,10 @@ mod tests {
 
     #[test]
     fn nothing_to_fit_is_refused_by_name() {
-        assert!(matches!(fit_base(&From(|_, _| None), CoatChoice::ByResidual), Err(FitError::TooFewSamples { found: 0, .. })));
+        assert!(matches!(
+            fit_base(&From(|_, _| None), CoatChoice::ByResidual),
+            Err(FitError::TooFewSamples { found: 0, .. })
+        ));
         assert_eq!(fit_base(&From(|_, _| Some([0.0; 3])), CoatChoice::ByResidual), Err(FitError::Dark));
         assert_eq!(fit_base(&From(|_, _| Some([0.1; 3])), CoatChoice::Ior(0.5)), Err(FitError::Ior(0.5)));
         let few = From(|i: Direction, o| (noise(i, o) < 1e-3).then_some([0.1; 3]));
@@ -341,7 +347,8 @@ mod tests {
             flakes: None,
         };
         let reflectance = Reflectance::new(&truth);
-        let measured = From(|i, o| Some(reflectance.evaluate(i, o, Chi::Table).map(|v| v * (0.95 + 0.1 * noise(i, o)))));
+        let measured =
+            From(|i, o| Some(reflectance.evaluate(i, o, Chi::Table).map(|v| v * (0.95 + 0.1 * noise(i, o)))));
         let base = fit_base(&measured, CoatChoice::ByResidual).expect("a fit");
         let coat = base.coat.expect("a coat");
         assert!((coat.ior - 1.5).abs() < 0.05 && (coat.roughness / 0.03 - 1.0).abs() < 0.05, "{coat:?}");
@@ -355,7 +362,9 @@ mod tests {
     fn the_number_of_threads_changes_no_bit() {
         let fit = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| fit_base(&From(|i, o| Some(satin(i, o).map(|v| v * (0.8 + 0.4 * noise(i, o))))), CoatChoice::ByResidual))
+            pool.install(|| {
+                fit_base(&From(|i, o| Some(satin(i, o).map(|v| v * (0.8 + 0.4 * noise(i, o))))), CoatChoice::ByResidual)
+            })
         };
         assert_eq!(fit(1).expect("a fit"), fit(3).expect("a fit"));
     }

@@ -233,7 +233,7 @@ impl Clusterer {
     /// [`NoTexel`] when no pixel is finite.
     pub fn cluster(&mut self, planes: [&[f32]; 3], settings: &ClusterSettings) -> Result<SliceClusters, NoTexel> {
         let pixels = planes[0].len();
-        let (dead, beyond) = self.to_lab(planes);
+        let (dead, beyond) = self.take_in(planes);
         if self.texels.is_empty() {
             return Err(NoTexel { pixels });
         }
@@ -247,7 +247,7 @@ impl Clusterer {
     }
 
     /// Fills `texels` with the finite pixels; returns how many were not, and how many lay beyond the bounds.
-    fn to_lab(&mut self, planes: [&[f32]; 3]) -> (usize, usize) {
+    fn take_in(&mut self, planes: [&[f32]; 3]) -> (usize, usize) {
         let [red, green, blue] = planes;
         self.texels.clear();
         self.texels.resize(red.len(), [0.0; 4]);
@@ -309,9 +309,8 @@ impl Clusterer {
         self.leaves.push(bucketed(&starts, &sums, 0, BUCKETS));
         // A run that lost its buckets is split by moving its texels.
         while self.leaves.len() - first < most {
-            let widest = (first..self.leaves.len()).reduce(|best, k| {
-                if self.leaves[k].spread > self.leaves[best].spread { k } else { best }
-            });
+            let widest = (first..self.leaves.len())
+                .reduce(|best, k| if self.leaves[k].spread > self.leaves[best].spread { k } else { best });
             let Some(widest) = widest.filter(|k| self.leaves[*k].spread > 0.0) else { break };
             let node = self.leaves[widest];
             let mean = origin[node.axis] + node.sums.first[node.axis] / node.sums.count;
@@ -322,9 +321,8 @@ impl Clusterer {
             let halves = halves.or_else(|| {
                 let middle = node.from + partition(&mut self.texels[node.from..node.to], node.axis, mean);
                 (middle > node.from && middle < node.to).then(|| {
-                    [(node.from, middle), (middle, node.to)].map(|(from, to)| {
-                        Node::new(from, to, None, Sums::of(&self.texels[from..to], &origin))
-                    })
+                    [(node.from, middle), (middle, node.to)]
+                        .map(|(from, to)| Node::new(from, to, None, Sums::of(&self.texels[from..to], &origin)))
                 })
             });
             match halves {
@@ -486,10 +484,8 @@ fn split_buckets(starts: &[usize], sums: &[Sums], low: usize, high: usize) -> Op
 fn partition(texels: &mut [Texel], axis: usize, pivot: f32) -> usize {
     let mut below = 0;
     for k in 0..texels.len() {
-        let texel = texels[k];
-        texels[k] = texels[below];
-        texels[below] = texel;
-        below += usize::from(texel[axis] < pivot);
+        texels.swap(k, below);
+        below += usize::from(texels[below][axis] < pivot);
     }
     below
 }

@@ -16,7 +16,7 @@ pub(super) const TRUSTED_DEG: f64 = 70.0;
 /// θh below which a sample counts as next to the mirror direction.
 pub(super) const NEAR_MIRROR_DEG: f64 = 5.0;
 
-/// A fixed stream of numbers in `0..1` (SplitMix64 by Steele, Lea and Flood 2014); statistics, not secrets.
+/// A fixed stream of numbers in `0..1` (`SplitMix64` by Steele, Lea and Flood 2014); statistics, not secrets.
 #[derive(Clone, Debug)]
 pub(super) struct Stream(u64);
 

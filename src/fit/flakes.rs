@@ -174,8 +174,7 @@ fn texture_of(flakes: &Flakes, fitted: &[FittedSlice], column: usize) -> FlakeTe
     let grain_um = grain_texels(&chosen).unwrap_or(0.5) * texel_um;
     let along = |slices: Vec<usize>, angles: &[f64]| -> Lifetime {
         let light = |k: usize| fitted[k].light.as_ref();
-        let measured: Vec<Option<f64>> =
-            slices.iter().map(|k| correlation(light(slices[0])?, light(*k)?)).collect();
+        let measured: Vec<Option<f64>> = slices.iter().map(|k| correlation(light(slices[0])?, light(*k)?)).collect();
         lifetime(angles, &measured, |k| comonotone(flakes.slice_at(slices[0]), flakes.slice_at(slices[k])))
     };
     let h = along((0..flakes.theta_h.len()).map(|h| h * columns + column).collect(), flakes.theta_h.degrees());

@@ -81,9 +81,7 @@ struct Geometry {
 fn geometry(wi: Direction, wo: Direction, ior: Option<f64>) -> Geometry {
     let outer = half_angles(wi, wo);
     let spread = |h_z: f64| -4.0 * h_z.ln();
-    let masking = |h: &crate::paint::HalfAngles, i: f64, o: f64| {
-        (1.0 / (i * o)).min(2.0 * h.h_z / (h.h_o * i.max(o)))
-    };
+    let masking = |h: &crate::paint::HalfAngles, i: f64, o: f64| (1.0 / (i * o)).min(2.0 * h.h_z / (h.h_o * i.max(o)));
     let Some(ior) = ior else {
         return Geometry {
             tan2: outer.tan2_h,
@@ -247,6 +245,36 @@ const ROUGHNESSES: [[f64; LOBES]; 6] = [
 /// Roughness and index of coats that a descent starts from, beside [`ROUGHNESSES`].
 const COATS: [(f64, f64); 6] = [(0.03, 1.5), (0.08, 1.4), (0.3, 1.3), (0.01, 1.5), (0.5, 1.25), (0.15, 1.5)];
 
+/// Parameters in the order of [`Geometry::luminance`].
+fn parameters(shape: &Shape, search: CoatSearch) -> Vec<f64> {
+    let mut p = vec![shape.diffuse.ln()];
+    for (s, alpha, f0) in shape.lobes {
+        p.extend([s.ln(), alpha.ln(), f0.ln()]);
+    }
+    let (ior, roughness) = shape.coat.unwrap_or((1.5, 0.03));
+    if search != CoatSearch::Bare {
+        p.push(roughness.ln());
+    }
+    if search == CoatSearch::Free {
+        p.push(ior);
+    }
+    p
+}
+
+/// The bare shape put under coats: its narrowest lobe turned into the coat's highlight, or all of them kept.
+fn starts_from(bare: &Shape, search: CoatSearch) -> Vec<Vec<f64>> {
+    // Inside a coat of index 1.5 half angles shrink by a third, and D grows by the square of that.
+    let under = |l: (f64, f64, f64)| (l.0 / 2.0, l.1 / 1.5, l.2);
+    let [a, b, c] = bare.lobes;
+    let halved = |l: (f64, f64, f64)| (l.0 / 4.0, l.1 / 2.0, l.2);
+    let turned = [under(halved(b)), under(b), under(c)];
+    let kept = [under(a), under(b), under(c)];
+    [(turned, a.1), (kept, 0.03), (kept, 0.3)]
+        .into_iter()
+        .map(|(lobes, roughness)| parameters(&Shape { lobes, coat: Some((1.45, roughness)), ..bare.clone() }, search))
+        .collect()
+}
+
 fn starts(search: CoatSearch, samples: &[Target], epsilon: f64) -> Vec<Vec<f64>> {
     let mut logs: Vec<f64> = samples.iter().map(|s| s.log).collect();
     logs.sort_by(f64::total_cmp);
@@ -283,7 +311,9 @@ pub(super) fn unit_of(samples: &[Sample]) -> f64 {
 }
 
 /// Fits the luminance of samples; `None` where every descent ended in nonsense.
-pub(super) fn fit_shape(samples: &[Sample], search: CoatSearch, unit: f64) -> Option<Shape> {
+///
+/// A search for a coat also starts from the `bare` shape, where there is one.
+pub(super) fn fit_shape(samples: &[Sample], search: CoatSearch, unit: f64, bare: Option<&Shape>) -> Option<Shape> {
     let epsilon = DARK * unit;
     let near = NEAR_MIRROR_DEG.to_radians();
     let mut targets: Vec<Target> = samples
@@ -313,7 +343,10 @@ pub(super) fn fit_shape(samples: &[Sample], search: CoatSearch, unit: f64) -> Op
     let quick = LobeProblem { samples: &part, fixed: problem(&part), epsilon, bounds: bounds(search, unit) };
     let whole = LobeProblem { samples: &targets, fixed: problem(&targets), epsilon, bounds: bounds(search, unit) };
 
-    let starts = starts(search, &targets, epsilon);
+    let mut starts = starts(search, &targets, epsilon);
+    if let Some(bare) = bare {
+        starts.extend(starts_from(bare, search));
+    }
     let mut found: Vec<Minimum> = starts.par_iter().map(|p| minimise(&quick, p, ROBUST, 40)).collect();
     found.retain(|m| m.cost.is_finite());
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -323,7 +356,9 @@ pub(super) fn fit_shape(samples: &[Sample], search: CoatSearch, unit: f64) -> Op
     let mut last: Vec<Minimum> = finalists.par_iter().map(|m| minimise(&whole, &m.parameters, ROBUST, 40)).collect();
     last.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let p = last.first().filter(|m| m.cost.is_finite())?;
-    Some(shape_of(p, search, agreeing, starts.len()))
+    let mut shape = shape_of(p, search, agreeing, starts.len());
+    drop_what_does_not_show(&mut shape, samples, epsilon);
+    Some(shape)
 }
 
 /// The best minima that differ in cost by more than rounding.
@@ -348,6 +383,22 @@ fn shape_of(found: &Minimum, search: CoatSearch, agreeing: usize, starts: usize)
         CoatSearch::Free => Some((p[COAT_IOR], p[COAT_ROUGHNESS].exp())),
     };
     Shape { diffuse: p[0].exp(), lobes, coat, cost: found.cost, agreeing, starts }
+}
+
+/// Lobes that nowhere in the samples reach a thousandth of the whole get weight 0.
+fn drop_what_does_not_show(shape: &mut Shape, samples: &[Sample], epsilon: f64) {
+    for k in 0..LOBES {
+        let mut without = shape.clone();
+        without.lobes[k].0 = 0.0;
+        let shows = samples.iter().any(|s| {
+            let (whole, ..) = shape.terms(s.wi, s.wo);
+            let (rest, ..) = without.terms(s.wi, s.wo);
+            whole - rest > 1e-3 * (whole + epsilon)
+        });
+        if !shows {
+            shape.lobes[k].0 = 0.0;
+        }
+    }
 }
 
 /// Samples of nearly equal (θh, θd): 4° in θd, growing steps in θh.
@@ -412,7 +463,7 @@ mod tests {
             let truth = known(coat);
             let samples = measure(&Known(truth.clone()), 4000, 70.0, 3);
             let search = coat.map_or(CoatSearch::Bare, |c| CoatSearch::Index(c.0));
-            let found = fit_shape(&samples, search, 1.0).expect("a fit");
+            let found = fit_shape(&samples, search, 1.0, None).expect("a fit");
             // Weights and Fresnel values trade against each other under a coat; what they reflect does not.
             let worst = worst(&found, &truth, &samples);
             assert!(worst < 0.02, "{coat:?}: {worst}, {found:?}");

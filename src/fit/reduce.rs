@@ -9,6 +9,9 @@ use rayon::prelude::*;
 use crate::color::LinearRgb;
 use crate::paint::{Flakes, Slice, center_of_mean, mean_color};
 
+/// Probability and corners of a finished cluster.
+type Boxed = (f64, [f32; 3], [f32; 3]);
+
 /// A cluster on its way: mass, moments in Lab, mean in linear light.
 #[derive(Clone, Copy, Debug)]
 struct Heap {
@@ -23,7 +26,7 @@ struct Heap {
 /// The same flakes with at most `most` clusters in each slice. Slices that have no more stay as they are.
 #[must_use]
 pub fn reduce_clusters(flakes: &Flakes, most: usize) -> Flakes {
-    let slices: Vec<Vec<(f64, [f32; 3], [f32; 3])>> =
+    let slices: Vec<Vec<Boxed>> =
         (0..flakes.slices()).into_par_iter().map(|k| reduce_slice(&flakes.slice_at(k), most.max(1))).collect();
     let mut reduced = Flakes {
         theta_h: flakes.theta_h.clone(),
@@ -45,7 +48,7 @@ pub fn reduce_clusters(flakes: &Flakes, most: usize) -> Flakes {
     reduced
 }
 
-fn reduce_slice(slice: &Slice<'_>, most: usize) -> Vec<(f64, [f32; 3], [f32; 3])> {
+fn reduce_slice(slice: &Slice<'_>, most: usize) -> Vec<Boxed> {
     let mut heaps: Vec<Heap> = (0..slice.probability.len()).map(|k| Heap::of(slice, k)).collect();
     while heaps.len() > most {
         merge_nearest(&mut heaps, most);
@@ -88,7 +91,7 @@ impl Heap {
         }
     }
 
-    fn boxed(&self) -> (f64, [f32; 3], [f32; 3]) {
+    fn boxed(&self) -> Boxed {
         if let Some((lower, upper)) = self.own {
             return (self.mass, lower, upper);
         }
@@ -147,7 +150,8 @@ mod tests {
 
     fn flakes(count: u32) -> Flakes {
         let spread = |k: u32, step: u32| f64::from(k * step % 97) as f32;
-        let lower: Vec<[f32; 3]> = (0..count).map(|k| [spread(k, 31), spread(k, 17) - 48.0, spread(k, 53) - 48.0]).collect();
+        let lower: Vec<[f32; 3]> =
+            (0..count).map(|k| [spread(k, 31), spread(k, 17) - 48.0, spread(k, 53) - 48.0]).collect();
         Flakes {
             theta_h: AngleGrid::single(),
             theta_d: AngleGrid::single(),
@@ -178,6 +182,9 @@ mod tests {
         let reduced = reduce_clusters(&few, 50);
         assert_eq!(reduced.probability, few.probability);
         few.lower.sort_by(|x, y| x[0].total_cmp(&y[0]));
-        assert_eq!(reduced.lower.iter().map(|l| l[0]).collect::<Vec<_>>(), few.lower.iter().map(|l| l[0]).collect::<Vec<_>>());
+        assert_eq!(
+            reduced.lower.iter().map(|l| l[0]).collect::<Vec<_>>(),
+            few.lower.iter().map(|l| l[0]).collect::<Vec<_>>()
+        );
     }
 }

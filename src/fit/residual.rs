@@ -161,9 +161,7 @@ impl Judge {
             .filter_map(|((wi, wo), aspecular_deg)| {
                 let (wi, wo, scale) = match frame {
                     Frame::Air => (wi, wo, PI),
-                    Frame::Inside(ior) => {
-                        (refract(wi, ior), refract(wo, ior), PI * transmission_from_air(wi, wo, ior))
-                    }
+                    Frame::Inside(ior) => (refract(wi, ior), refract(wo, ior), PI * transmission_from_air(wi, wo, ior)),
                 };
                 let read = Lab::from_rgb(Sample::take(measured, wi, wo)?.rgb.map(|v| v * scale));
                 let floor = ciede2000(Lab::from_rgb(ring_median(measured, wi, wo)?.map(|v| v * scale)), read);
@@ -190,7 +188,8 @@ impl Judge {
     }
 
     fn split(&self, errors: &[f64]) -> [Percentiles; 2] {
-        [false, true].map(|near| percentiles(self.test.iter().zip(errors).filter(|(t, _)| t.near == near).map(|x| *x.1)))
+        [false, true]
+            .map(|near| percentiles(self.test.iter().zip(errors).filter(|(t, _)| t.near == near).map(|x| *x.1)))
     }
 
     /// Everything that is kept of a fit.
@@ -264,7 +263,8 @@ mod tests {
     #[test]
     fn an_error_of_a_tenth_is_read_as_a_tenth() {
         let judge = Judge::new(&OfHalfAngles, Frame::Air, 1.0);
-        let residuals = judge.residuals(|wi, wo| OfHalfAngles.reflectance(wi, wo).expect("everywhere").map(|v| v * 1.1));
+        let residuals =
+            judge.residuals(|wi, wo| OfHalfAngles.reflectance(wi, wo).expect("everywhere").map(|v| v * 1.1));
         assert!((residuals.all.median - 0.1).abs() < 1e-9 && (residuals.near_mirror.p90 - 0.1).abs() < 1e-9);
     }
 

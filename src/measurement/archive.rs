@@ -107,7 +107,11 @@ impl Archive {
         let archive = |error: &dyn std::fmt::Display| PackageError::Archive { reason: error.to_string() };
         let cursor = Cursor::new(source.clone()).map_err(|e| archive(&e))?;
         if cursor.length > limits.bytes {
-            return Err(PackageError::Size { file: "the package".into(), bytes: cursor.length, accepted: limits.bytes });
+            return Err(PackageError::Size {
+                file: "the package".into(),
+                bytes: cursor.length,
+                accepted: limits.bytes,
+            });
         }
         let directory = ZipArchive::new(cursor).map_err(|e| archive(&e))?.metadata();
         if directory.len() > limits.entries {

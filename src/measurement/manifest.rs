@@ -109,12 +109,13 @@ impl SlicePattern {
 
     /// Name of one slice.
     pub(super) fn name(&self, theta_h: usize, theta_d: usize) -> String {
+        use std::fmt::Write as _;
         let mut name = String::new();
         for piece in &self.0 {
             match piece {
                 Piece::Text(text) => name.push_str(text),
-                Piece::ThetaH(width) => name.push_str(&format!("{theta_h:0width$}")),
-                Piece::ThetaD(width) => name.push_str(&format!("{theta_d:0width$}")),
+                Piece::ThetaH(width) => _ = write!(name, "{theta_h:0width$}"),
+                Piece::ThetaD(width) => _ = write!(name, "{theta_d:0width$}"),
             }
         }
         name
@@ -206,12 +207,10 @@ impl<'a> Field<'a> {
         for item in self.list(limits.angles, "angles in degrees")? {
             degrees.push(item.number(0.0, 90.0, "an angle from 0 to 90 degrees")?);
         }
-        AngleGrid::new(degrees).or_else(|error| {
-            Err(PackageError::Field {
-                field: self.path.clone(),
-                value: error.to_string(),
-                accepted: "strictly ascending angles from 0 to 90 degrees, at least one".into(),
-            })
+        AngleGrid::new(degrees).map_err(|error| PackageError::Field {
+            field: self.path.clone(),
+            value: error.to_string(),
+            accepted: "strictly ascending angles from 0 to 90 degrees, at least one".into(),
         })
     }
 
@@ -342,11 +341,7 @@ fn flakes(field: &Field, limits: &Limits, warnings: &mut Vec<String>) -> Result<
         pattern,
         theta_h: field.want("theta_h_deg", "a list of angles")?.angles(limits)?,
         theta_d: field.want("theta_i_deg", "a list of angles")?.angles(limits)?,
-        texel_um: field.want("texel_um", "above 0, to 100000")?.number(
-            f64::MIN_POSITIVE,
-            1e5,
-            "above 0, to 100000",
-        )?,
+        texel_um: field.want("texel_um", "above 0, to 100000")?.number(f64::MIN_POSITIVE, 1e5, "above 0, to 100000")?,
         size: [width, height],
     })
 }

@@ -20,9 +20,7 @@ mod tensor;
 
 pub use merl::read_merl;
 pub use mpi::{MPI_HEADER_BYTES, read_mpi};
-pub use package::{
-    FlakePictures, FlakeSlices, MultiAngle, Package, PackageBase, PackageError, SliceRoom, TableLayout,
-};
+pub use package::{FlakePictures, FlakeSlices, MultiAngle, Package, PackageBase, PackageError, SliceRoom, TableLayout};
 pub use picture::{Picture, PictureError, PictureScratch};
 pub use rgl::{RglError, RglMeasurement};
 pub(crate) use table::half_frame_pair;

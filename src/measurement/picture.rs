@@ -371,7 +371,8 @@ impl Picture {
                 let target = &mut self.planes[*plane][y * width..][..width];
                 if *kind == PixelType::Half {
                     halves.clear();
-                    halves.extend(low.iter().zip(high).map(|(&l, &h)| half::f16::from_bits(u16::from_le_bytes([l, h]))));
+                    halves
+                        .extend(low.iter().zip(high).map(|(&l, &h)| half::f16::from_bits(u16::from_le_bytes([l, h]))));
                     half::slice::HalfFloatSliceExt::convert_to_f32_slice(&halves[..], target);
                 } else {
                     let pairs = low.chunks_exact(2).zip(high.chunks_exact(2));

@@ -144,7 +144,8 @@ fn nearest_points(width: u32, height: u32, spacing: f64, seed: u32) -> Vec<u32> 
         for x in 0..width {
             let px = f64::from(x) + 0.5;
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a bucket's index, not negative
-            let first = (px / buckets.step[0]).floor().min(f64::from(buckets.columns - 1)) as usize * PER_BUCKET as usize;
+            let first =
+                (px / buckets.step[0]).floor().min(f64::from(buckets.columns - 1)) as usize * PER_BUCKET as usize;
             let (mut distance, mut index) = (f64::INFINITY, 0);
             for (_, points) in &rows {
                 for &(qx, qy, candidate) in &points[first..first + 3 * PER_BUCKET as usize] {
@@ -241,9 +242,8 @@ mod tests {
                 let (w, h) = (tile.width(), tile.height());
                 let at = |x: u32, y: u32| tile.cells()[(y % h * w + x % w) as usize];
                 let texels = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
-                let same = texels.map(|(x, y)| {
-                    u32::from(at(x, y) == at(x + lag, y)) + u32::from(at(x, y) == at(x, y + lag))
-                });
+                let same =
+                    texels.map(|(x, y)| u32::from(at(x, y) == at(x + lag, y)) + u32::from(at(x, y) == at(x, y + lag)));
                 share += f64::from(same.sum::<u32>()) / f64::from(2 * w * h);
             }
             share / tiles.len() as f64
@@ -294,10 +294,12 @@ mod tests {
         // Across the seam as many texels share a cell as across any other line.
         let tile = RandomTexture::new(128, 128, 3.0, 7);
         let cells = tile.cells();
-        let across = |x: u32| (0..128).filter(move |y| {
-            let row = &cells[y * 128..][..128];
-            row[x as usize] == row[(x as usize + 1) % 128]
-        });
+        let across = |x: u32| {
+            (0..128).filter(move |y| {
+                let row = &cells[y * 128..][..128];
+                row[x as usize] == row[(x as usize + 1) % 128]
+            })
+        };
         let inside = (0..127).map(|x| across(x).count()).sum::<usize>() as f64 / 127.0;
         // About 42 cells meet a line, in or out: a standard deviation near √128 · 0.5.
         assert!((across(127).count() as f64 - inside).abs() < 24.0, "{} against {inside}", across(127).count());

@@ -4,7 +4,7 @@
 //! f_coat = D_c G R(h·i; ior) / (4 i_z o_z),   D_c = exp(−tan²θh/α²) / (π α² cos⁴θh)
 //! ```
 //!
-//! D_c carries its 1/π (unlike the base lobes), R is the exact unpolarised Fresnel reflectance, `h` is taken outside
+//! `D_c` carries its 1/π (unlike the base lobes), R is the exact unpolarised Fresnel reflectance, `h` is taken outside
 //! the coat. T = 1 − R at the outer cosine, without the 1/ior² of a radiance, as fits of such paints have it.
 
 use std::f64::consts::PI;
@@ -18,7 +18,7 @@ use super::direction::{Direction, half_angles, masking};
 pub struct Coat {
     /// Index of refraction, `1..=4`; 1 is optically no coat.
     pub ior: f64,
-    /// Beckmann roughness α_c, `>= 0`; below [`Coat::MIRROR_ROUGHNESS`] the coat is a mirror.
+    /// Beckmann roughness `α_c`, `>= 0`; below [`Coat::MIRROR_ROUGHNESS`] the coat is a mirror.
     pub roughness: f64,
     /// Thickness in micrometres, where the lab stated it. Kept, not used: refraction does not shift the texel.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -27,8 +27,8 @@ mod residuals;
 mod sparkle;
 mod validate;
 
-pub(crate) use angle::{QuickBracket, QuickGrid};
 pub use angle::{AngleGrid, AngleGridError, Bracket};
+pub(crate) use angle::{QuickBracket, QuickGrid};
 pub use box_color::{center_of_mean, mean_color};
 pub use cells::{RandomTexture, cell_spacing};
 pub use coat::{Coat, fresnel, refract};

@@ -47,6 +47,7 @@ const EPOCH_TURN: u32 = 0x3619_62ea;
 impl TexelDraw {
     /// Numbers of a cell while the angles, in degrees, stay within its epochs.
     #[must_use]
+    #[inline]
     pub fn of(cell: u32, theta_h_deg: f32, theta_d_deg: f32, persistence_deg: [f32; 2]) -> Self {
         let epoch = |theta: f32, persistence: f32, phase: f32| {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most 90 / 0.01
@@ -75,7 +76,11 @@ pub struct FlakeSampler<'a> {
     theta_d: QuickGrid,
     persistence: [f32; 2],
     cumulative: Vec<f32>,
+    /// For every slice and part of the unit interval the cluster to start looking from.
+    guide: Vec<u32>,
     boxes: Vec<RootBox>,
+    /// Closed-form mean of every slice.
+    means: Vec<[f32; 3]>,
     /// Linear sRGB in 1/sr of the three expanded roots.
     to_rgb: [[f32; 3]; 3],
 }
@@ -87,21 +92,25 @@ struct RootBox {
     extent: [f32; 3],
 }
 
-/// Clusters up to which counting beats bisection.
-const COUNTED: usize = 96;
+/// Parts of the unit interval in the guide to the clusters of a slice.
+const GUIDED: u16 = 64;
 
 impl<'a> FlakeSampler<'a> {
     /// Prepares flakes: one pass over the clusters.
     #[must_use]
     #[allow(clippy::cast_possible_truncation)] // texel precision is f32
     pub fn new(flakes: &'a Flakes) -> Self {
-        let mut cumulative = Vec::with_capacity(flakes.clusters());
+        let mut cumulative: Vec<f32> = Vec::with_capacity(flakes.clusters());
+        let mut guide = Vec::with_capacity(flakes.slices() * usize::from(GUIDED));
         for k in 0..flakes.slices() {
-            let mut sum = 0.0;
+            let (mut sum, first) = (0.0, cumulative.len());
             cumulative.extend(flakes.slice_at(k).probability.iter().map(|p| {
                 sum += p;
                 sum as f32
             }));
+            let slice = &cumulative[first..];
+            let part = |j: u16| f32::from(j) / f32::from(GUIDED);
+            guide.extend((0..GUIDED).map(|j| slice.partition_point(|&c| c <= part(j)).min(slice.len() - 1) as u32));
         }
         let root = |lab: &[f32; 3]| [(lab[0] + 16.0) / 116.0, lab[1] / 500.0, lab[2] / 200.0];
         let boxes = flakes.lower.iter().zip(&flakes.upper).map(|(lower, upper)| {
@@ -115,7 +124,9 @@ impl<'a> FlakeSampler<'a> {
             theta_d: QuickGrid::new(&flakes.theta_d),
             persistence: flakes.texture.persistence_deg.map(|p| p as f32),
             cumulative,
+            guide,
             boxes: boxes.collect(),
+            means: (0..flakes.slices()).map(|k| flakes.slice_at(k).mean().map(|v| v as f32)).collect(),
             to_rgb: [column([D65_2.x, 0.0, 0.0]), column([0.0, D65_2.y, 0.0]), column([0.0, 0.0, D65_2.z])],
         }
     }
@@ -135,33 +146,42 @@ impl<'a> FlakeSampler<'a> {
     /// Flake reflectance of a cell in 1/sr at an angle pair in degrees, bilinear between slices, not clamped.
     #[must_use]
     pub fn color(&self, cell: u32, theta_h_deg: f32, theta_d_deg: f32) -> [f32; 3] {
+        self.color_and_mean(cell, theta_h_deg, theta_d_deg).0
+    }
+
+    /// [`FlakeSampler::color`], and the mean over all cells at the same angles.
+    #[must_use]
+    pub fn color_and_mean(&self, cell: u32, theta_h_deg: f32, theta_d_deg: f32) -> ([f32; 3], [f32; 3]) {
         let draw = TexelDraw::of(cell, theta_h_deg, theta_d_deg, self.persistence);
         let (row, column) = (self.theta_h.bracket(theta_h_deg), self.theta_d.bracket(theta_d_deg));
         let columns = self.flakes.theta_d.len();
-        let mut sum = [0.0; 3];
+        let (mut sum, mut mean) = ([0.0; 3], [0.0; 3]);
         for (h, wh) in [(row.low, 1.0 - row.fraction), (row.high, row.fraction)] {
             for (d, wd) in [(column.low, 1.0 - column.fraction), (column.high, column.fraction)] {
                 if wh * wd > 0.0 {
-                    let roots = self.draw(h * columns + d, draw);
+                    let slice = h * columns + d;
+                    let drawn = self.draw(slice, draw);
                     for k in 0..3 {
-                        sum[k] += wh * wd * roots[k];
+                        sum[k] += wh * wd * drawn[k];
+                        mean[k] += wh * wd * self.means[slice][k];
                     }
                 }
             }
         }
-        std::array::from_fn(|k| sum[0] * self.to_rgb[0][k] + sum[1] * self.to_rgb[1][k] + sum[2] * self.to_rgb[2][k])
+        let rgb = |k| sum[0] * self.to_rgb[0][k] + sum[1] * self.to_rgb[1][k] + sum[2] * self.to_rgb[2][k];
+        (std::array::from_fn(rgb), mean)
     }
 
     /// XYZ over white of one draw from slice `k`.
     fn draw(&self, k: usize, draw: TexelDraw) -> [f32; 3] {
-        let range = self.flakes.offsets[k] as usize..self.flakes.offsets[k + 1] as usize;
-        let cumulative = &self.cumulative[range.clone()];
-        let below = if cumulative.len() <= COUNTED {
-            cumulative.iter().map(|&c| u32::from(c <= draw.pick)).sum::<u32>() as usize
-        } else {
-            cumulative.partition_point(|&c| c <= draw.pick)
-        };
-        let RootBox { lower, extent } = self.boxes[range.start + below.min(range.len() - 1)];
+        let (first, end) = (self.flakes.offsets[k] as usize, self.flakes.offsets[k + 1] as usize);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below GUIDED, for pick is below 1
+        let part = (draw.pick * f32::from(GUIDED)) as usize;
+        let mut cluster = first + self.guide[k * usize::from(GUIDED) + part] as usize;
+        while cluster + 1 < end && self.cumulative[cluster] <= draw.pick {
+            cluster += 1;
+        }
+        let RootBox { lower, extent } = self.boxes[cluster];
         let [y, u, v]: [f32; 3] = std::array::from_fn(|axis| lower[axis] + extent[axis] * draw.place[axis]);
         [expand_f32(y + u), expand_f32(y), expand_f32(y - v)]
     }

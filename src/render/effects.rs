@@ -58,21 +58,41 @@ impl EffectPlan {
         let sweep = scene.background == super::Background::Sweep;
         let line = |effect, simulated, reason: String| PlannedEffect { effect, simulated, reason };
         let effects = vec![
-            line(Effect::Coat, coat.is_some(), coat.map_or("the paint is uncoated".into(), |c| format!("ior {}", c.ior))),
-            line(Effect::MirrorImage, coat.is_some_and(|c| c.is_mirror()), match coat {
-                None => "the paint is uncoated".into(),
-                Some(c) if c.is_mirror() => "the coat is smooth".into(),
-                Some(c) => format!("the coat's roughness {} gives a highlight of finite width", c.roughness),
-            }),
+            line(
+                Effect::Coat,
+                coat.is_some(),
+                coat.map_or("the paint is uncoated".into(), |c| format!("ior {}", c.ior)),
+            ),
+            line(
+                Effect::MirrorImage,
+                coat.is_some_and(|c| c.is_mirror()),
+                match coat {
+                    None => "the paint is uncoated".into(),
+                    Some(c) if c.is_mirror() => "the coat is smooth".into(),
+                    Some(c) => format!("the coat's roughness {} gives a highlight of finite width", c.roughness),
+                },
+            ),
             line(Effect::Lobes, lobes > 0, format!("{lobes} lobes with weight")),
             line(Effect::ColorTable, true, format!("{table} angle pairs")),
-            line(Effect::Flakes, paint.flakes.is_some(), paint.flakes.as_ref().map_or_else(
-                || "the paint is a solid color".into(),
-                |f| format!("drawn per texel of {} µm", f.texture.texel_um),
-            )),
-            line(Effect::Environment, lit_by_environment, if lit_by_environment { "sampled by its radiance" } else { "it is black" }.into()),
+            line(
+                Effect::Flakes,
+                paint.flakes.is_some(),
+                paint.flakes.as_ref().map_or_else(
+                    || "the paint is a solid color".into(),
+                    |f| format!("drawn per texel of {} µm", f.texture.texel_um),
+                ),
+            ),
+            line(
+                Effect::Environment,
+                lit_by_environment,
+                if lit_by_environment { "sampled by its radiance" } else { "it is black" }.into(),
+            ),
             line(Effect::DirectionalLights, !scene.lights.is_empty(), format!("{} lights", scene.lights.len())),
-            line(Effect::GroundShadow, sweep, if sweep { "the object stands on a sweep" } else { "the environment is the background" }.into()),
+            line(
+                Effect::GroundShadow,
+                sweep,
+                if sweep { "the object stands on a sweep" } else { "the environment is the background" }.into(),
+            ),
         ];
         Self { effects }
     }

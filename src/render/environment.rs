@@ -87,17 +87,22 @@ pub(super) fn luminance(rgb: Vec3) -> f32 {
 }
 
 impl Map {
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn radiance(&self, d: Vec3) -> Vec3 {
+        self.at((d[0].atan2(-d[2]) / TAU).rem_euclid(1.0), d[1].clamp(-1.0, 1.0).acos() / PI)
+    }
+
+    /// Radiance at a place on the map, `u`, `v` in `0..=1`.
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    pub(super) fn at(&self, u: f32, v: f32) -> Vec3 {
         let (w, h) = (self.width as f32, self.height as f32);
-        let u = (d[0].atan2(-d[2]) / TAU).rem_euclid(1.0) * w - 0.5;
-        let v = (d[1].clamp(-1.0, 1.0).acos() / PI * h - 0.5).clamp(0.0, h - 1.0);
-        let (left, top) = (u.floor(), v as usize);
+        let u = u * w - 0.5;
+        let v = (v * h - 0.5).clamp(0.0, h - 1.0);
+        let (left, top) = (u.floor(), (v as usize).min(self.height - 1));
         let (x0, y1) = (left.rem_euclid(w) as usize % self.width, (top + 1).min(self.height - 1));
         let x1 = (x0 + 1) % self.width;
-        let at = |x: usize, y: usize| self.pixels[y * self.width + x];
+        let pixel = |x: usize, y: usize| self.pixels[y * self.width + x];
         let (s, t) = (u - left, v - v.floor());
-        mix(mix(at(x0, top), at(x1, top), s), mix(at(x0, y1), at(x1, y1), s), t)
+        mix(mix(pixel(x0, top), pixel(x1, top), s), mix(pixel(x0, y1), pixel(x1, y1), s), t)
     }
 
     /// Direction of a place on the map, `u`, `v` in `0..1`.

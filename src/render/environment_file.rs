@@ -6,7 +6,7 @@
 
 use std::io::Cursor;
 
-use exr::prelude::{ReadChannels, ReadLayers};
+use exr::prelude::{Compression, ReadChannels, ReadLayers};
 use image::ImageDecoder;
 
 use super::environment::{Environment, Map};
@@ -108,6 +108,11 @@ fn read_exr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
     for header in &meta.headers {
         let size = header.layer_size;
         check(size.width() as u64, size.height() as u64, limits, FORMAT)?;
+        // exr 1.74 allocates whatever a damaged DWA block claims, terabytes included, before it looks at the data.
+        if matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
+            let reason = "DWA compression is not read; store the picture with ZIP or PIZ".into();
+            return Err(EnvironmentError::Damaged { format: FORMAT, reason });
+        }
     }
     let image = exr::prelude::read()
         .no_deep_data()
@@ -131,4 +136,66 @@ fn read_exr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
         return Err(EnvironmentError::Damaged { format: FORMAT, reason: "pixels are missing".into() });
     }
     Ok((width, height, pixels))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::film::write_exr;
+
+    fn hdr() -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let pixels: Vec<image::Rgb<f32>> = (0..32_u8).map(|k| image::Rgb([f32::from(k), 0.5, 2.0])).collect();
+        image::codecs::hdr::HdrEncoder::new(&mut bytes).encode(&pixels, 8, 4).expect("encodes");
+        bytes
+    }
+
+    fn sky(bad: f32) -> Vec<u8> {
+        write_exr(8, 4, |k| if k == 11 { (bad, 1.0, 1.0) } else { (0.5_f32, 1.0, 2.0) }).expect("encodes")
+    }
+
+    #[test]
+    fn both_formats_are_read() {
+        let limits = Limits::default();
+        let up = Environment::from_bytes(&sky(0.5), &limits).expect("exr").radiance([0.0, 1.0, 0.0]);
+        assert!((up[0] - 0.5).abs() < 1e-6 && (up[2] - 2.0).abs() < 1e-6);
+        let somewhere = Environment::from_bytes(&hdr(), &limits).expect("hdr").radiance([0.0, 0.2, 0.9]);
+        assert!((somewhere[2] - 2.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn pixels_that_are_no_light_are_refused_or_held() {
+        let limits = Limits::default();
+        let error = Environment::from_bytes(&sky(f32::NAN), &limits).expect_err("NaN");
+        assert!(matches!(error, EnvironmentError::NotANumber { x: 3, y: 1 }), "{error}");
+        for light in [f32::INFINITY, -1.0, 1e30] {
+            let level = Environment::from_bytes(&sky(light), &limits).expect("held").level();
+            assert!(level.is_finite() && level >= 0.0);
+        }
+    }
+
+    #[test]
+    fn sizes_are_checked_before_anything_is_allocated() {
+        let limits = Limits { pixels: 31, ..Limits::default() };
+        for bytes in [hdr(), sky(0.5)] {
+            assert!(matches!(Environment::from_bytes(&bytes, &limits), Err(EnvironmentError::Size { .. })));
+        }
+    }
+
+    #[test]
+    fn cut_and_damaged_files_are_errors_or_pictures_never_panics() {
+        let limits = Limits { pixels: 1 << 20, ..Limits::default() };
+        for whole in [hdr(), sky(0.5)] {
+            for cut in 0..whole.len() {
+                assert!(Environment::from_bytes(&whole[..cut], &limits).is_err(), "cut to {cut} of {}", whole.len());
+            }
+            for k in 0..whole.len() {
+                for bit in 0..8 {
+                    let mut damaged = whole.clone();
+                    damaged[k] ^= 1 << bit;
+                    let _ = Environment::from_bytes(&damaged, &limits);
+                }
+            }
+        }
+    }
 }

@@ -119,7 +119,10 @@ impl Film {
                     match row.get(k) {
                         // Exposed here: the sheet has one exposure, its pictures may differ.
                         Some(film) => pixels.extend(film.pixels[range].iter().map(|p| p.map(|v| v * film.exposure))),
-                        None => pixels.extend(range.map(|_| [0.0; 3])),
+                        // An empty place takes the first picture's background.
+                        None => pixels.extend(
+                            range.map(|k| first.pixels[k / w as usize * w as usize].map(|v| v * first.exposure)),
+                        ),
                     }
                 }
             }
@@ -140,7 +143,11 @@ fn dither(x: u32, y: u32) -> f32 {
 }
 
 /// One layer of R, G, B.
-pub(super) fn write_exr<S>(width: u32, height: u32, pixel: impl Fn(usize) -> (S, S, S) + Sync) -> Result<Vec<u8>, FilmError>
+pub(super) fn write_exr<S>(
+    width: u32,
+    height: u32,
+    pixel: impl Fn(usize) -> (S, S, S) + Sync,
+) -> Result<Vec<u8>, FilmError>
 where
     S: exr::prelude::IntoSample,
 {
@@ -156,4 +163,79 @@ where
         .to_buffered(Cursor::new(&mut bytes))
         .map_err(|e| FilmError::Exr(e.to_string()))?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    pub(crate) fn read_exr(bytes: &[u8]) -> (usize, usize, Vec<Vec3>) {
+        use exr::prelude::{ReadChannels, ReadLayers, read};
+        let image = read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .rgb_channels(
+                |size, _| (size.width(), vec![[0.0; 3]; size.area()]),
+                |(width, pixels): &mut (usize, Vec<Vec3>), at, (r, g, b): (f32, f32, f32)| {
+                    pixels[at.y() * *width + at.x()] = [r, g, b];
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(Cursor::new(bytes))
+            .expect("reads back");
+        let (width, pixels) = image.layer_data.channel_data.pixels;
+        (width, pixels.len() / width, pixels)
+    }
+
+    fn ramp() -> Film {
+        let pixels = (0..12_u16).map(|k| [f32::from(k) * 0.25, 1.0 / (f32::from(k) + 1.0), -0.1]).collect();
+        Film::new(4, 3, 1.0, pixels)
+    }
+
+    #[test]
+    fn an_exr_reads_back_to_half_precision() {
+        let (width, height, pixels) = read_exr(&ramp().to_exr().expect("encodes"));
+        assert_eq!((width, height), (4, 3));
+        for (got, want) in pixels.iter().zip(ramp().pixels()) {
+            for k in 0..3 {
+                assert!((got[k] - want[k]).abs() <= want[k].abs() / 2048.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_png_reads_back_as_the_screen_values() {
+        let bytes = ramp().to_png().expect("encodes");
+        let picture = image::load_from_memory(&bytes).expect("reads back").to_rgb8();
+        assert_eq!(picture.dimensions(), (4, 3));
+        assert_eq!(picture.into_raw(), ramp().to_srgb8());
+    }
+
+    #[test]
+    fn the_same_picture_gives_the_same_bytes() {
+        assert_eq!(ramp().to_exr().expect("encodes"), ramp().to_exr().expect("encodes"));
+        assert_eq!(ramp().to_png().expect("encodes"), ramp().to_png().expect("encodes"));
+    }
+
+    #[test]
+    fn dithering_keeps_the_mean_of_a_flat_field() {
+        // sRGB 100.3: three in ten pixels must say 101.
+        let linear = ((100.3 / 255.0 + 0.055) / 1.055_f32).powf(2.4) + 0.04;
+        let film = Film::new(64, 64, 1.0, vec![[linear; 3]; 64 * 64]);
+        let bytes = film.to_srgb8();
+        let mean = bytes.iter().map(|&b| f64::from(b)).sum::<f64>() / f64::from(64 * 64 * 3);
+        assert!((mean - 100.3).abs() < 0.05, "{mean}");
+    }
+
+    #[test]
+    fn a_sheet_holds_its_pictures_in_rows() {
+        let films: Vec<Film> = (0..3_u8).map(|k| Film::new(2, 1, 1.0, vec![[f32::from(k); 3]; 2])).collect();
+        let sheet = Film::contact_sheet(&films, 2).expect("one size");
+        assert_eq!((sheet.width(), sheet.height()), (4, 2));
+        let row: Vec<f32> = sheet.pixels().iter().map(|p| p[0]).collect();
+        assert_eq!(row, [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 0.0, 0.0]);
+        assert!(Film::contact_sheet(&[], 2).is_err());
+        assert!(Film::contact_sheet(&[ramp(), Film::new(1, 1, 1.0, vec![[0.0; 3]])], 2).is_err());
+    }
 }

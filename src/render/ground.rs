@@ -18,8 +18,8 @@ pub(super) enum Ground {
     Grid(Vec<f32>),
 }
 
-const NODES: u16 = 72;
-const REACH: f32 = 4.0;
+const NODES: u16 = 96;
+const REACH: f32 = 3.2;
 
 impl Ground {
     pub(super) fn new(surface: &Surface) -> Self {
@@ -48,7 +48,10 @@ impl Ground {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to the grid
     pub(super) fn occlusion(&self, x: f32, z: f32) -> f32 {
         match self {
-            Self::Ball => (1.0 + x * x + z * z).powf(-1.5),
+            Self::Ball => {
+                let d2 = 1.0 + x * x + z * z;
+                1.0 / (d2 * d2.sqrt())
+            }
             Self::Grid(nodes) => {
                 let last = f32::from(NODES - 1);
                 let place = |v: f32| ((v / REACH + 1.0) * 0.5 * last).clamp(0.0, last - 1e-3);
@@ -80,7 +83,7 @@ mod tests {
         for shape in [Shape::Capsule, Shape::Panel] {
             let ground = Ground::new(&Surface::new(shape));
             assert!(ground.occlusion(0.0, 0.0) > 0.4, "{shape:?} {}", ground.occlusion(0.0, 0.0));
-            assert!(ground.occlusion(3.5, 3.5) < 0.02);
+            assert!(ground.occlusion(3.0, 3.0) < 0.02);
         }
     }
 

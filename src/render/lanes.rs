@@ -85,7 +85,7 @@ impl Lanes {
         Self(from_fn(|k| if a.0[k] < b.0[k] { self.0[k] } else { other.0[k] }))
     }
 
-    /// `exp(−x)` for `x ≥ 0` to 4e-7 relative, in arithmetic that every machine does alike; 0 beyond 87.
+    /// `exp(−x)` for `x ≥ 0` to 4e-7 + 1e-7 x relative (the rounding of x itself), in arithmetic that every machine does alike; 0 beyond 87.
     ///
     /// `2^n 2^f` with `f` in ±0.5, a Taylor polynomial of degree 6 in `f ln 2`.
     #[inline(always)]
@@ -166,7 +166,8 @@ mod tests {
             let x = f32::from(k) * 0.01;
             let got = f64::from(Lanes::splat(x).exp_of_negative().0[3]);
             let want = (-f64::from(x)).exp();
-            assert!((got - want).abs() <= 5e-6 * want.max(1e-37), "{x}: {got} {want}");
+            let accepted = (4e-7 + 1e-7 * f64::from(x)) * want;
+            assert!((got - want).abs() <= accepted || x > 87.2, "{x}: {got} {want}");
         }
         assert_eq!(Lanes::splat(1e30).exp_of_negative().0[0], 0.0);
     }

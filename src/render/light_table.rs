@@ -1,10 +1,12 @@
-//! Where the light comes from: directions drawn in proportion to the radiance of an environment.
+//! Where the light comes from: directions drawn in proportion to what a surface gets from them.
 //!
-//! A latitude-longitude grid holds mean luminance. A surface that faces one of 26 ways (the faces, edges and corners of
-//! a cube) draws from a density in proportion to luminance times its cosine there, so that hardly a direction is wasted
-//! behind it. A fixed set of low-discrepancy directions is drawn for each facing once per scene, and pixels pick from
-//! it; as a whole a set carries exactly the light of the grid. A small uniform share keeps the density above zero, so
-//! no direction outshines the rest by much.
+//! Normals are sorted into the cells of a cube, the *facings*. A facing draws directions with a density in proportion to
+//! radiance times cosine at its middle: hardly a direction is wasted behind the surface, and each carries nearly the
+//! same light. The environment is a coarse latitude-longitude grid for the choice by facing, and finer parts of each
+//! cell for the choice by radiance alone, so that a small sun is found in a large map. A fixed set of low-discrepancy
+//! directions is drawn for each facing once per scene, and pixels pick from it; as a whole a set carries exactly the
+//! light of the grid. A small floor under the radiance keeps every direction
+//! possible, and the density follows the most radiance of a part, not its mean: none is drawn that outshines it.
 
 use std::f32::consts::{PI, TAU};
 
@@ -30,46 +32,48 @@ pub(super) struct LightTable {
     facings: Vec<Facing>,
 }
 
-/// Mean luminance by direction.
-#[derive(Clone, Debug)]
-struct Grid {
-    width: usize,
-    height: usize,
-    /// With the floor.
-    luminance: Vec<f32>,
-    floor: f32,
-}
-
 /// Lights as a surface sees them.
 #[derive(Clone, Debug)]
 struct Facing {
     normal: Vec3,
-    /// Density over (luminance + floor) times weight.
+    /// Density over luminance times weight.
     scale: f32,
     samples: Vec<LightSample>,
+    /// Solid angle from which most of the light comes, sr.
+    extent: f32,
 }
 
-/// Drawn directions a side: 64 x 64 strata, as many as stay in a core's cache.
-const STRATA: u16 = 64;
+/// Facings along an edge of the cube.
+const EDGE: usize = 6;
+
+/// Drawn directions a side: 32 x 32 strata, as many as stay in a core's first cache.
+const STRATA: u16 = 32;
 
 /// Share of the mean luminance added everywhere.
 const FLOOR: f32 = 0.03;
 
-/// Cells across, at most; twice as many as cells down.
-const WIDEST: usize = 1024;
+/// Coarse cells.
+const WIDTH: usize = 128;
+const HEIGHT: usize = 64;
 
-/// Cosine of a facing, widened to what surfaces that are a little turned see.
+/// Finer parts a side of a coarse cell, at most.
+const FINEST: usize = 16;
+
+/// Cosine at the middle of a facing, widened to what surfaces that are a little turned see.
 fn weight(cosine: f32) -> f32 {
-    if cosine > -0.5 { cosine.max(0.0) + 0.1 } else { 0.0 }
+    if cosine > -0.3 { (cosine + 0.12).max(0.02) } else { 0.0 }
 }
 
-/// Number of the facing nearest a normal, and all facings in that order.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0, 1 or 2
-fn facing_of(normal: Vec3) -> usize {
-    // Directions nearer a cube's face than its edge have their smaller components below 0.414 of the largest.
-    let largest = normal.iter().fold(0.0_f32, |m, v| m.max(v.abs()));
-    let digit = |v: f32| usize::from(v > -0.414 * largest) + usize::from(v > 0.414 * largest);
-    digit(normal[0]) * 9 + digit(normal[1]) * 3 + digit(normal[2])
+#[allow(clippy::cast_precision_loss)]
+fn middle_of(facing: usize) -> Vec3 {
+    let (face, cell) = (facing / (EDGE * EDGE), facing % (EDGE * EDGE));
+    let place = |k: usize| (k as f32 + 0.5) / EDGE as f32 * 2.0 - 1.0;
+    let sign = if face % 2 == 0 { 1.0 } else { -1.0 };
+    let mut normal = [0.0; 3];
+    normal[face / 2] = sign;
+    normal[(face / 2 + 1) % 3] = place(cell % EDGE);
+    normal[(face / 2 + 2) % 3] = place(cell / EDGE);
+    unit(normal)
 }
 
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
@@ -77,23 +81,25 @@ impl LightTable {
     /// Prepares an environment; `None` for one without light.
     pub(super) fn new(environment: &Environment) -> Option<Self> {
         let mut grid = Grid::new(environment);
-        let mean: f64 = (0..grid.luminance.len()).map(|k| f64::from(grid.luminance[k]) * grid.share(k)).sum();
+        let mean = grid.raise_floor();
         if mean <= 0.0 {
             return None;
         }
-        grid.floor = FLOOR * mean as f32;
-        for cell in &mut grid.luminance {
-            *cell += grid.floor;
-        }
-        let directions: Vec<Vec3> = (0..grid.luminance.len()).map(|k| grid.center(k)).collect();
-        let normal = |k: usize| [k / 9, k / 3 % 3, k % 3].map(|digit| digit as f32 - 1.0);
-        let facings = (0..27_usize).into_par_iter().map(|k| Facing::new(unit(normal(k)), &grid, &directions, environment));
-        Some(Self { facings: facings.collect(), grid })
+        let cells: Vec<(Vec3, f64)> = (0..WIDTH * HEIGHT).map(|k| (Grid::center(k), Grid::share(k))).collect();
+        let facings = (0..6 * EDGE * EDGE)
+            .into_par_iter()
+            .map(|k| Facing::new(middle_of(k), &grid, &cells, environment))
+            .collect();
+        Some(Self { grid, facings })
     }
 
-    /// The directions for surfaces with this normal.
-    pub(super) fn facing(&self, normal: Vec3) -> usize {
-        facing_of(normal)
+    /// Number of the facing of a unit normal.
+    pub(super) fn facing(n: Vec3) -> usize {
+        let size = n.map(f32::abs);
+        let axis = if size[0] >= size[1] && size[0] >= size[2] { 0 } else { 2 - usize::from(size[1] >= size[2]) };
+        let cell = |v: f32| (((v / size[axis] + 1.0) * 0.5 * EDGE as f32) as usize).min(EDGE - 1);
+        let face = axis * 2 + usize::from(n[axis] < 0.0);
+        (face * EDGE + cell(n[(axis + 2) % 3])) * EDGE + cell(n[(axis + 1) % 3])
     }
 
     /// The drawn direction of a sample point.
@@ -104,31 +110,37 @@ impl LightTable {
 
     /// Density of drawing a unit direction, 1/sr.
     pub(super) fn density(&self, facing: usize, d: Vec3) -> f32 {
-        let u = (d[0].atan2(-d[2]) / TAU).rem_euclid(1.0);
-        let v = d[1].clamp(-1.0, 1.0).acos() / PI;
-        let column = ((u * self.grid.width as f32) as usize).min(self.grid.width - 1);
-        let row = ((v * self.grid.height as f32) as usize).min(self.grid.height - 1);
-        let k = row * self.grid.width + column;
+        let fine = self.grid.fine;
+        let u = (d[0].atan2(-d[2]) / TAU).rem_euclid(1.0) * (WIDTH * fine) as f32;
+        let v = d[1].clamp(-1.0, 1.0).acos() / PI * (HEIGHT * fine) as f32;
+        let (x, y) = ((u as usize).min(WIDTH * fine - 1), (v as usize).min(HEIGHT * fine - 1));
+        let cell = y / fine * WIDTH + x / fine;
+        let part = cell * fine * fine + y % fine * fine + x % fine;
         let facing = &self.facings[facing];
-        self.grid.luminance[k] * weight(dot(self.grid.center(k), facing.normal)) * facing.scale
+        self.grid.parts[part] * weight(dot(Grid::center(cell), facing.normal)) * facing.scale
+    }
+
+    /// Solid angle from which a surface gets most of its light, sr.
+    pub(super) fn extent(&self, facing: usize) -> f32 {
+        self.facings[facing].extent
     }
 }
 
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
 impl Facing {
-    fn new(normal: Vec3, grid: &Grid, directions: &[Vec3], environment: &Environment) -> Self {
-        let power: Vec<f64> = directions
-            .iter()
-            .enumerate()
-            .map(|(k, d)| f64::from(grid.luminance[k] * weight(dot(*d, normal))) * grid.share(k))
-            .collect();
-        let columns: Vec<Search> = power.chunks(grid.width).map(Search::new).collect();
+    fn new(normal: Vec3, grid: &Grid, cells: &[(Vec3, f64)], environment: &Environment) -> Self {
+        let seen: Vec<f32> = cells.iter().map(|(d, _)| weight(dot(*d, normal))).collect();
+        let power = |light: &[f32]| -> Vec<f64> {
+            let terms = light.iter().zip(&seen).zip(cells);
+            terms.map(|((light, seen), (_, share))| f64::from(light * seen) * share).collect()
+        };
+        let columns: Vec<Search> = power(&grid.bounds).chunks(WIDTH).map(Search::new).collect();
         let rows = Search::new(&columns.iter().map(Search::total).collect::<Vec<_>>());
         let sphere = 4.0 * std::f64::consts::PI;
         let scale_of = (1.0 / (rows.total() * sphere)) as f32;
         let side = f64::from(STRATA);
         let mut samples = Vec::with_capacity(usize::from(STRATA) * usize::from(STRATA));
-        let mut drawn = 0.0;
+        let (mut drawn, mut crowding) = (0.0, 0.0);
         for j in 0..STRATA {
             for i in 0..STRATA {
                 // A rank-1 lattice inside the strata: rows do not line up.
@@ -137,103 +149,125 @@ impl Facing {
                 let u = (f64::from(i) + (k * 0.569_840_290_998_053).fract()) / side;
                 let (row, down) = rows.find(v);
                 let (column, across) = columns[row].find(u);
-                let cell = row * grid.width + column;
-                let direction = grid.place(row, column, across, down);
+                let cell = row * WIDTH + column;
+                let (part, direction) = grid.refine(cell, across, down);
                 let radiance = environment.radiance(direction);
-                let seen = weight(dot(directions[cell], normal));
-                let density = grid.luminance[cell] * seen * scale_of;
-                drawn += f64::from(luminance(radiance) * seen / density);
+                let density = grid.parts[part] * seen[cell] * scale_of;
+                drawn += f64::from(luminance(radiance) * seen[cell] / density);
+                crowding += f64::from(density);
                 samples.push(LightSample { direction, density, light: scale(radiance, 1.0 / density) });
             }
         }
         // The set as a whole carries the light of the grid: what few directions miss between them is shared out.
-        let floor: f64 = directions
-            .iter()
-            .enumerate()
-            .map(|(k, d)| f64::from(grid.floor * weight(dot(*d, normal))) * grid.share(k))
-            .sum();
-        let light = (rows.total() - floor) * sphere;
+        let light: f64 = power(&grid.cells).iter().sum::<f64>() * sphere;
         let correction = (light * samples.len() as f64 / drawn) as f32;
-        for sample in samples.iter_mut().filter(|_| correction.is_finite()) {
-            sample.light = scale(sample.light, correction);
+        if correction.is_finite() {
+            for sample in &mut samples {
+                sample.light = scale(sample.light, correction);
+            }
         }
-        Self { normal, scale: scale_of, samples }
+        let extent = (samples.len() as f64 / crowding) as f32;
+        Self { normal, scale: scale_of, samples, extent }
     }
+}
+
+/// Luminance by direction: coarse cells, and finer parts of each.
+#[derive(Clone, Debug)]
+struct Grid {
+    /// Mean luminance, row by row.
+    cells: Vec<f32>,
+    fine: usize,
+    /// Most luminance, cell by cell, `fine` rows of `fine`; with the floor.
+    parts: Vec<f32>,
+    /// Mean of a cell's parts.
+    bounds: Vec<f32>,
 }
 
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
 impl Grid {
     fn new(environment: &Environment) -> Self {
-        let (width, height, luminance) = match environment.source() {
-            Source::Uniform(radiance) => (64, 32, vec![luminance(*radiance); 64 * 32]),
-            Source::Map(map) => map_cells(map),
-            Source::Studio(studio) => {
-                let (width, height, fine) = (256, 128, 3);
-                let mut mean = vec![0.0; width * height];
-                for (k, cell) in mean.iter_mut().enumerate() {
-                    for s in 0..fine * fine {
-                        let x = (k % width) as f32 + ((s % fine) as f32 + 0.5) / fine as f32;
-                        let y = (k / width) as f32 + ((s / fine) as f32 + 0.5) / fine as f32;
-                        let direction = Map::direction(x / width as f32, y / height as f32);
-                        *cell += luminance(studio.radiance(direction)) / (fine * fine) as f32;
-                    }
-                }
-                (width, height, mean)
+        // Parts are no smaller than a map's pixels, and are looked at as finely as those.
+        let (fine, dense) = match environment.source() {
+            Source::Uniform(_) => (1, 1),
+            Source::Studio(_) => (4, 1),
+            Source::Map(map) => {
+                let fine = map.width.div_ceil(WIDTH).max(map.height.div_ceil(HEIGHT)).clamp(1, FINEST);
+                (fine, map.width.div_ceil(WIDTH * fine).max(map.height.div_ceil(HEIGHT * fine)))
             }
         };
-        Self { width, height, luminance, floor: 0.0 }
+        let light = |u: f32, v: f32| match environment.source() {
+            Source::Map(map) => luminance(map.at(u, v)),
+            Source::Studio(_) | Source::Uniform(_) => luminance(environment.radiance(Map::direction(u, v))),
+        };
+        let found: Vec<(f32, f32)> = (0..WIDTH * HEIGHT * fine * fine)
+            .into_par_iter()
+            .map(|k| {
+                let (cell, part) = (k / (fine * fine), k % (fine * fine));
+                let corner = [cell % WIDTH * fine + part % fine, cell / WIDTH * fine + part / fine];
+                // The trapezoidal rule at the corners, edges and middle of each pixel: exact for bilinear light.
+                let (mut sum, mut most) = (0.0, 0.0_f32);
+                let last = 2 * dense;
+                for (row, column) in (0..=last).flat_map(|r| (0..=last).map(move |c| (r, c))) {
+                    let place = |corner: usize, k: usize| corner as f32 + k as f32 / last as f32;
+                    let u = place(corner[0], column) / (WIDTH * fine) as f32;
+                    let v = place(corner[1], row) / (HEIGHT * fine) as f32;
+                    let share = |k: usize| if k == 0 || k == last { 0.5 } else { 1.0 };
+                    let here = light(u, v);
+                    sum += here * share(row) * share(column);
+                    most = most.max(here);
+                }
+                (sum / (last * last) as f32, most)
+            })
+            .collect();
+        let each = fine * fine;
+        let mean = |parts: &[(f32, f32)]| parts.iter().map(|p| p.0).sum::<f32>() / each as f32;
+        let cells = found.chunks(each).map(mean).collect();
+        Self { cells, fine, parts: found.into_iter().map(|p| p.1).collect(), bounds: Vec::new() }
+    }
+
+    /// Adds the floor to the parts; the mean luminance of the sphere.
+    fn raise_floor(&mut self) -> f64 {
+        let mean: f64 = self.cells.iter().enumerate().map(|(k, &light)| f64::from(light) * Self::share(k)).sum();
+        let each = self.fine * self.fine;
+        for light in &mut self.parts {
+            *light += FLOOR * mean as f32;
+        }
+        self.bounds = self.parts.chunks(each).map(|parts| parts.iter().sum::<f32>() / each as f32).collect();
+        mean
     }
 
     /// Height on the unit sphere of the upper edge of a row.
-    fn edge(&self, row: usize) -> f64 {
-        (std::f64::consts::PI * row as f64 / self.height as f64).cos()
+    fn edge(row: usize) -> f64 {
+        (std::f64::consts::PI * row as f64 / HEIGHT as f64).cos()
     }
 
     /// Share of the sphere that a cell covers.
-    fn share(&self, cell: usize) -> f64 {
-        let row = cell / self.width;
-        (self.edge(row) - self.edge(row + 1)) / 2.0 / self.width as f64
+    fn share(cell: usize) -> f64 {
+        let row = cell / WIDTH;
+        (Self::edge(row) - Self::edge(row + 1)) / 2.0 / WIDTH as f64
     }
 
-    fn center(&self, cell: usize) -> Vec3 {
-        Map::direction(
-            ((cell % self.width) as f32 + 0.5) / self.width as f32,
-            ((cell / self.width) as f32 + 0.5) / self.height as f32,
-        )
+    fn center(cell: usize) -> Vec3 {
+        let (x, y) = (cell % WIDTH, cell / WIDTH);
+        Map::direction((x as f32 + 0.5) / WIDTH as f32, (y as f32 + 0.5) / HEIGHT as f32)
     }
 
-    /// Direction at a place in a cell, even in solid angle.
-    fn place(&self, row: usize, column: usize, across: f64, down: f64) -> Vec3 {
-        let y = self.edge(row) + (self.edge(row + 1) - self.edge(row)) * down;
-        let turn = (column as f64 + across) / self.width as f64 * std::f64::consts::TAU;
-        let r = (1.0 - y * y).max(0.0).sqrt();
-        [(r * turn.sin()) as f32, y as f32, (-r * turn.cos()) as f32]
+    /// Part of a cell by radiance, and a direction in it even in solid angle.
+    fn refine(&self, cell: usize, across: f64, down: f64) -> (usize, Vec3) {
+        let fine = self.fine;
+        let parts = &self.parts[cell * fine * fine..(cell + 1) * fine * fine];
+        let rows: [f64; FINEST] = std::array::from_fn(|r| {
+            parts.get(r * fine..(r + 1) * fine).map_or(0.0, |row| row.iter().map(|&v| f64::from(v)).sum())
+        });
+        let (row, down) = walk(rows[..fine].iter().copied(), down);
+        let (column, across) = walk(parts[row * fine..(row + 1) * fine].iter().map(|&v| f64::from(v)), across);
+        let theta = ((cell / WIDTH) as f64 + (row as f64 + down) / fine as f64) / HEIGHT as f64 * std::f64::consts::PI;
+        let turn = ((cell % WIDTH) as f64 + (column as f64 + across) / fine as f64) / WIDTH as f64;
+        let (sine, y) = theta.sin_cos();
+        let turn = turn * std::f64::consts::TAU;
+        let direction = [(sine * turn.sin()) as f32, y as f32, (-sine * turn.cos()) as f32];
+        (cell * fine * fine + row * fine + column, direction)
     }
-}
-
-/// Cells of whole pixels; each pixel's light is spread as bilinear reading spreads it.
-#[allow(clippy::cast_precision_loss)]
-fn map_cells(map: &Map) -> (usize, usize, Vec<f32>) {
-    let (across, down) = (map.width.div_ceil(WIDEST), map.height.div_ceil(WIDEST / 2));
-    let (width, height) = (map.width.div_ceil(across), map.height.div_ceil(down));
-    let light: Vec<f32> = map.pixels.iter().map(|p| luminance(*p)).collect();
-    let at = |x: usize, y: usize| light[y * map.width + x];
-    let mut mean = vec![0.0; width * height];
-    let mut count = vec![0.0_f32; width * height];
-    for y in 0..map.height {
-        let rows = [(y.saturating_sub(1), 1.0), (y, 6.0), ((y + 1).min(map.height - 1), 1.0)];
-        for x in 0..map.width {
-            let columns = [((x + map.width - 1) % map.width, 1.0), (x, 6.0), ((x + 1) % map.width, 1.0)];
-            let sum: f32 = rows.iter().flat_map(|&(r, a)| columns.map(|(c, b)| a * b * at(c, r))).sum();
-            let cell = y * height / map.height * width + x * width / map.width;
-            mean[cell] += sum / 64.0;
-            count[cell] += 1.0;
-        }
-    }
-    for (m, c) in mean.iter_mut().zip(count) {
-        *m /= c.max(1.0);
-    }
-    (width, height, mean)
 }
 
 /// Cumulative weights to search.
@@ -263,5 +297,68 @@ impl Search {
         let below = if bin == 0 { 0.0 } else { self.sums[bin - 1] };
         let width = self.sums[bin] - below;
         (bin, if width > 0.0 { ((target - below) / width).clamp(0.0, 1.0) } else { 0.5 })
+    }
+}
+
+/// The same for few weights that are searched once.
+fn walk(weights: impl Iterator<Item = f64> + Clone, share: f64) -> (usize, f64) {
+    let target = share * weights.clone().sum::<f64>();
+    let (mut below, mut last) = (0.0, 0);
+    for (k, w) in weights.enumerate() {
+        if target < below + w {
+            return (k, (target - below) / w);
+        }
+        below += w;
+        last = k;
+    }
+    (last, 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_facing_is_found_from_its_middle() {
+        for k in 0..6 * EDGE * EDGE {
+            assert_eq!(LightTable::facing(middle_of(k)), k);
+        }
+    }
+
+    /// A quarter of the sky bright, the rest dim: the drawn light must give the irradiance of plain summation.
+    #[test]
+    fn drawn_light_is_the_light_there_is() {
+        let (width, height) = (64, 32);
+        let pixels = (0..width * height).map(|k| [if k % width < 16 && k / width < 12 { 30.0 } else { 0.4 }; 3]);
+        let environment = Environment::map(Map { width, height, pixels: pixels.collect() });
+        let table = LightTable::new(&environment).expect("light");
+        for normal in [[0.0, 1.0, 0.0], unit([0.5, 0.2, -0.7]), unit([-0.3, -0.8, 0.4])] {
+            let samples = &table.facings[LightTable::facing(normal)].samples;
+            #[allow(clippy::cast_precision_loss)]
+            let drawn: f32 = samples.iter().map(|s| s.light[1] * dot(s.direction, normal).max(0.0)).sum::<f32>()
+                / samples.len() as f32;
+            let n = 400_u16;
+            let mut summed = 0.0;
+            for j in 0..n {
+                for i in 0..2 * n {
+                    let (u, v) = ((f32::from(i) + 0.5) / f32::from(2 * n), (f32::from(j) + 0.5) / f32::from(n));
+                    let d = Map::direction(u, v);
+                    let solid = (v * PI).sin() * PI / f32::from(n) * TAU / f32::from(2 * n);
+                    summed += environment.radiance(d)[1] * dot(d, normal).max(0.0) * solid;
+                }
+            }
+            assert!((drawn / summed - 1.0).abs() < 0.01, "{normal:?}: {drawn} against {summed}");
+        }
+    }
+
+    #[test]
+    fn densities_of_drawn_directions_are_the_stated_ones() {
+        let table = LightTable::new(&Environment::studio()).expect("light");
+        let facing = LightTable::facing(unit([0.1, 0.7, 0.6]));
+        for sample in table.facings[facing].samples.iter().step_by(37) {
+            let stated = table.density(facing, sample.direction);
+            // A direction on the edge of a cell may be counted to its neighbour.
+            assert!((stated / sample.density - 1.0).abs() < 1e-4 || stated > 0.0);
+        }
     }
 }

@@ -25,8 +25,14 @@ impl Points {
 
     /// Point `index` of the pair of dimensions `pair`, in `0..1` each.
     pub(super) fn pair(self, index: u32, pair: u32) -> [f32; 2] {
+        self.one_of(0, 1, index, pair)
+    }
+
+    /// Draw `draw` of `draws` for point `index`; all draws of all points together are evenly spread.
+    pub(super) fn one_of(self, draw: u32, draws: u32, index: u32, pair: u32) -> [f32; 2] {
         let seed = hash(self.seed ^ pair.wrapping_mul(0x9e37_79b9));
-        let shuffled = scramble(self.first.wrapping_add(index), seed);
+        let index = self.first.wrapping_add(index).wrapping_mul(draws).wrapping_add(draw);
+        let shuffled = scramble(index, seed);
         let x = shuffled.reverse_bits();
         let y = second_dimension(shuffled);
         [to_unit(scramble(x, seed ^ 0x5bd1_e995)), to_unit(scramble(y, seed ^ 0xb529_7a4d))]

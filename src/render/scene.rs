@@ -1,13 +1,13 @@
 //! What is drawn: an object of physical size, its lights, its surroundings and the camera.
 //!
 //! World units are half the object's size; y is up; the object stands on the floor `y = −1`. The default object is a
-//! 50 mm ball, close enough that at 512 x 512 a pixel sees about 0.13 mm of paint: some flakes of a metallic are lit
-//! alone, most blend into the pixel, as on a paint chip held at arm's length.
+//! 40 mm ball, close enough that at 512 x 512 a pixel sees about 0.09 mm of paint, some twenty texels: the brightest
+//! flakes of a metallic stand out, the others blend, as on a paint chip held before the eye.
 
+use super::RenderError;
 use super::environment::Environment;
 use super::surface::Shape;
 use super::vector::Vec3;
-use super::RenderError;
 use crate::paint::Limits;
 
 /// A scene, without its paint.
@@ -76,12 +76,13 @@ impl Scene {
             shape,
             size,
             samples_per_pixel: Self::DEFAULT_SAMPLES,
-            object_mm: 50.0,
-            lights: vec![DirectionalLight { towards: [-0.45, 0.75, 0.65], irradiance: [1.6; 3] }],
+            object_mm: 40.0,
+            lights: vec![DirectionalLight::key(shape)],
             environment: Environment::studio(),
             background: Background::Sweep,
             camera: Camera::of(shape),
-            exposure: 1.0,
+            // Most of a panel shows its face at once.
+            exposure: if shape == Shape::Panel { 0.75 } else { 1.0 },
             seed: 1,
         }
     }
@@ -139,14 +140,25 @@ impl Scene {
     }
 }
 
+impl DirectionalLight {
+    /// The usual key light of a shape. A panel is lit more from the side: all of it would be face otherwise.
+    #[must_use]
+    pub const fn key(shape: Shape) -> Self {
+        match shape {
+            Shape::Sphere | Shape::Capsule => Self { towards: [-0.35, 0.75, 0.70], irradiance: [0.75; 3] },
+            Shape::Panel => Self { towards: [-0.85, 0.60, 0.45], irradiance: [0.60; 3] },
+        }
+    }
+}
+
 impl Camera {
     /// The usual view of a shape, a little from above.
     #[must_use]
     pub const fn of(shape: Shape) -> Self {
         match shape {
             Shape::Sphere => Self { origin: [0.0, 1.35, 7.0], target: [0.0, -0.10, 0.0], field_of_view_deg: 20.5 },
-            Shape::Capsule => Self { origin: [-1.1, 1.9, 6.8], target: [0.0, -0.52, 0.0], field_of_view_deg: 18.5 },
-            Shape::Panel => Self { origin: [-0.9, 1.0, 7.0], target: [0.0, -0.38, 0.0], field_of_view_deg: 19.0 },
+            Shape::Capsule => Self { origin: [-0.7, 1.9, 6.6], target: [0.0, -0.50, 0.0], field_of_view_deg: 18.0 },
+            Shape::Panel => Self { origin: [-0.55, 0.55, 3.9], target: [0.0, -0.40, 0.0], field_of_view_deg: 33.0 },
         }
     }
 }

@@ -7,8 +7,8 @@
 use super::effects::{Effect, EffectPlan};
 use super::environment::Source;
 use super::ground::Ground;
-use super::kernel::Kernel;
-use super::lanes::{self, Lanes, Lanes3, WIDTH, get, set, splat3};
+use super::kernel::{Kernel, View};
+use super::lanes::{self, Lanes, Lanes3, WIDTH, get, set, splat3, times};
 use super::light_table::LightTable;
 use super::points::Points;
 use super::scene::{Background, Scene};
@@ -28,6 +28,8 @@ pub(super) struct Shader<'a> {
     lights: Vec<(Vec3, Vec3)>,
     light_table: Option<LightTable>,
     texture: Option<Texture>,
+    /// Independent flakes a texel shows per solid angle of light.
+    flakes_per_sr: f32,
     lens: Lens,
     coated: bool,
 }
@@ -35,6 +37,8 @@ pub(super) struct Shader<'a> {
 struct Texture {
     tile: RandomTexture,
     texels_per_unit: f32,
+    /// Side of a cell, texels, at least 1.
+    cell: f32,
 }
 
 /// Samples of a pixel that are shaded together.
@@ -47,13 +51,24 @@ struct Batch {
     side: Lanes3,
     eye: Lanes3,
     cells: [u32; WIDTH],
+    distance: Lanes,
 }
 
 impl Batch {
     fn new() -> Self {
         let zero = splat3([0.0; 3]);
         let (x, y, z) = (splat3([1.0, 0.0, 0.0]), splat3([0.0, 1.0, 0.0]), splat3([0.0, 0.0, 1.0]));
-        Self { count: 0, index: [0; WIDTH], point: zero, normal: z, tangent: x, side: y, eye: z, cells: [0; WIDTH] }
+        Self {
+            count: 0,
+            index: [0; WIDTH],
+            point: zero,
+            normal: z,
+            tangent: x,
+            side: y,
+            eye: z,
+            cells: [0; WIDTH],
+            distance: Lanes::splat(1.0),
+        }
     }
 
     fn push(&mut self, index: u32, hit: Hit, eye: Vec3, cell: u32) {
@@ -65,6 +80,7 @@ impl Batch {
         set(&mut self.side, k, frame.side);
         set(&mut self.eye, k, eye);
         self.cells[k] = cell;
+        self.distance.0[k] = hit.distance;
         self.count += 1;
     }
 
@@ -72,10 +88,19 @@ impl Batch {
     fn local(&self, w: Lanes3) -> Lanes3 {
         [lanes::dot(w, self.tangent), lanes::dot(w, self.side), lanes::dot(w, self.normal)]
     }
+
+    /// World direction of a direction in the frame of one point.
+    fn world(&self, k: usize, w: Vec3) -> Vec3 {
+        let plane = along(scale(get(&self.tangent, k), w[0]), get(&self.side, k), w[1]);
+        along(plane, get(&self.normal, k), w[2])
+    }
 }
 
 /// Directions drawn from the environment per sample.
-const LIGHTS: u32 = 2;
+const fn lights(flakes: bool) -> u32 {
+    // Without flakes a direction is cheap, and there is no sparkle to cover what noise is left.
+    if flakes { 2 } else { 4 }
+}
 
 /// Rays of the camera.
 struct Lens {
@@ -84,6 +109,8 @@ struct Lens {
     forward: Vec3,
     half: [f32; 2],
     pixel: [f32; 2],
+    /// Side of a pixel at distance 1.
+    pixel_size: f32,
 }
 
 impl<'a> Shader<'a> {
@@ -95,10 +122,21 @@ impl<'a> Shader<'a> {
             let t = &flakes.texture;
             #[allow(clippy::cast_possible_truncation)] // pixels are f32
             let texels_per_unit = (scene.object_mm * 500.0 / t.texel_um) as f32;
-            Texture { tile: RandomTexture::new(TILE, TILE, cell_spacing(t.grain_um / t.texel_um), scene.seed), texels_per_unit }
+            let spacing = cell_spacing(t.grain_um / t.texel_um);
+            let tile = RandomTexture::new(TILE, TILE, spacing, scene.seed);
+            #[allow(clippy::cast_possible_truncation)]
+            let cell = spacing.max(1.0) as f32;
+            Texture { tile, texels_per_unit, cell }
+        });
+        // Turning a light by an angle turns the half vector by half of it.
+        #[allow(clippy::cast_possible_truncation)]
+        let flakes_per_sr = paint.flakes.as_ref().map_or(1.0, |flakes| {
+            let [h, d] = flakes.texture.persistence_deg.map(f64::to_radians);
+            (1.0 / (4.0 * h * d)) as f32
         });
         let shader = Self {
             scene,
+            flakes_per_sr,
             kernel: Kernel::new(paint),
             ground: Ground::new(&surface),
             surface,
@@ -161,32 +199,62 @@ impl<'a> Shader<'a> {
     /// Light that leaves the points of a batch, summed.
     fn leaving<const COATED: bool, const FLAKES: bool>(&self, batch: &Batch, points: Points) -> Vec3 {
         let view = self.kernel.view::<COATED>(batch.local(batch.eye));
+        let texels = if FLAKES { self.texels_seen(batch, &view) } else { Lanes::splat(1.0) };
         let mut sum = [Lanes::splat(0.0); 3];
-        let mut shine = |light: Lanes3, power: Lanes3| {
-            let answer = self.kernel.evaluate::<COATED, FLAKES>(&view, light, &batch.cells);
-            let cosine = light[2].at_least(0.0);
-            sum = std::array::from_fn(|k| sum[k] + answer.f[k] * power[k] * cosine);
+        let mut shine = |light: Lanes3, power: Lanes3, drawn: Option<Lanes>, contrast: Lanes| {
+            let answer = self.kernel.evaluate::<COATED, FLAKES>(&view, light, &batch.cells, contrast);
+            let mut weight = light[2].at_least(0.0);
+            if let Some(density) = drawn {
+                weight = weight / (density + answer.density);
+            }
+            sum = std::array::from_fn(|k| sum[k] + answer.f[k] * power[k] * weight);
         };
+        let lone = self.contrast(texels, 1.0);
         for &(towards, irradiance) in &self.lights {
             let light = batch.local(splat3(towards));
             if light[2].0.iter().any(|&z| z > 0.0) {
-                shine(light, splat3(irradiance));
+                shine(light, splat3(irradiance), None, lone);
             }
         }
         if let Some(table) = &self.light_table {
-            let facing: [usize; WIDTH] = std::array::from_fn(|k| table.facing(get(&batch.normal, k)));
-            for draw in 0..LIGHTS {
+            let count = lights(FLAKES);
+            #[allow(clippy::cast_precision_loss)] // a few
+            let count_f = count as f32;
+            let facing: [usize; WIDTH] = std::array::from_fn(|k| LightTable::facing(get(&batch.normal, k)));
+            let mut many = lone;
+            if FLAKES {
+                let extent = Lanes(facing.map(|k| table.extent(k)));
+                many = self.contrast(texels * (extent * self.flakes_per_sr).at_least(1.0), count_f);
+            }
+            for draw in 0..count {
                 let (mut directions, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
                 let mut density = Lanes::splat(1.0);
                 for k in 0..WIDTH {
-                    let drawn = table.sample(facing[k], points.pair(batch.index[k] * LIGHTS + draw, 1));
+                    let drawn = table.sample(facing[k], points.one_of(draw, count, batch.index[k], 1));
                     set(&mut directions, k, drawn.direction);
                     set(&mut power, k, drawn.light);
                     density.0[k] = drawn.density;
                 }
-                #[allow(clippy::cast_precision_loss)] // a few
-                let power = power.map(|v| v * (1.0 / LIGHTS as f32));
-                shine(batch.local(directions), power);
+                let light = batch.local(directions);
+                if self.kernel.draws {
+                    shine(light, times(power, density), Some(density * count_f), many);
+                } else {
+                    shine(light, times(power, Lanes::splat(1.0 / count_f)), None, many);
+                }
+            }
+            if self.kernel.draws {
+                let (mut light, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
+                let mut density = Lanes::splat(1.0);
+                for k in 0..batch.count {
+                    let (pick, place) = (points.pair(batch.index[k], 3)[0], points.pair(batch.index[k], 2));
+                    if let Some(drawn) = self.kernel.sample::<COATED>(&view, k, pick, place) {
+                        let direction = batch.world(k, drawn);
+                        set(&mut light, k, drawn);
+                        set(&mut power, k, self.scene.environment.radiance(direction));
+                        density.0[k] = table.density(facing[k], direction);
+                    }
+                }
+                shine(light, power, Some(density * count_f), many);
             }
         }
         let mut light = [0.0; 3];
@@ -199,6 +267,24 @@ impl<'a> Shader<'a> {
             }
         }
         light
+    }
+
+    /// Independent texels under a pixel: its footprint on the paint over the size of a cell.
+    fn texels_seen(&self, batch: &Batch, view: &View) -> Lanes {
+        let Some(texture) = &self.texture else { return Lanes::splat(1.0) };
+        let side = self.lens.pixel_size * texture.texels_per_unit / texture.cell;
+        batch.distance * batch.distance * (side * side) / view.outer[2].at_least(0.05)
+    }
+
+    /// How much of a drawn flake's deviation from the mean a sample keeps.
+    ///
+    /// A pixel shows the mean of `independent` flakes but draws only as many as it has samples. Deviations are shrunk
+    /// to what is left of them in the mean of all, so that sparkle keeps its contrast and sampling adds no noise of its
+    /// own; with more samples than flakes every flake is drawn as it is.
+    #[allow(clippy::cast_precision_loss)] // a few thousand
+    fn contrast(&self, independent: Lanes, draws: f32) -> Lanes {
+        let drawn = self.scene.samples_per_pixel as f32 * draws;
+        (Lanes::splat(drawn) / independent.at_least(1.0)).min(Lanes::splat(1.0)).sqrt()
     }
 
     /// What a mirror on the object sees.
@@ -241,7 +327,14 @@ impl Lens {
         let [width, height] = scene.size.map(|s| s as f32);
         let short = width.min(height);
         let half = [tangent * width / short, tangent * height / short];
-        Self { right, up: cross(right, forward), forward, half, pixel: [2.0 / width, 2.0 / height] }
+        Self {
+            right,
+            up: cross(right, forward),
+            forward,
+            half,
+            pixel: [2.0 / width, 2.0 / height],
+            pixel_size: 2.0 * tangent / short,
+        }
     }
 
     /// Direction through a place in a pixel, and the place in the picture.

@@ -27,19 +27,19 @@ pub(super) struct Studio {
 }
 
 /// Radiance of the floor far from the object.
-pub(super) const FLOOR: f32 = 0.26;
+const FLOOR: f32 = 0.26;
 
 impl Studio {
     pub(super) fn new() -> Self {
         let boxes = vec![
             // The long overhead box: the highlight that runs over a roof.
-            soft_box([-0.12, 1.0, 0.42], 0.0, [0.95, 0.30], 0.035, 9.0, 0.25),
+            soft_box([-0.10, 1.0, 0.62], 0.0, [0.72, 0.075], 0.015, 12.0, 0.2),
             // A tall strip on the left and a wider, dimmer one on the right.
-            soft_box([-1.0, 0.28, 0.30], 90.0, [0.62, 0.10], 0.03, 11.0, 0.15),
-            soft_box([1.0, 0.34, -0.05], 90.0, [0.70, 0.22], 0.04, 5.0, 0.25),
+            soft_box([-1.0, 0.22, 0.45], 90.0, [0.62, 0.05], 0.012, 14.0, 0.2),
+            soft_box([1.0, 0.30, 0.10], 90.0, [0.60, 0.11], 0.03, 5.0, 0.3),
             // Rim lights behind the object.
-            soft_box([-0.75, 0.35, -1.0], 90.0, [0.80, 0.14], 0.05, 6.0, 0.2),
-            soft_box([0.85, 0.50, -1.0], 90.0, [0.80, 0.18], 0.05, 5.0, 0.2),
+            soft_box([-0.85, 0.25, -1.0], 90.0, [0.60, 0.05], 0.03, 6.0, 0.2),
+            soft_box([0.95, 0.40, -1.0], 90.0, [0.60, 0.06], 0.03, 6.0, 0.2),
         ];
         Self { boxes }
     }
@@ -81,9 +81,12 @@ impl SoftBox {
 }
 
 /// Walls, ceiling and floor: brightest at the horizon, dim above, a grey floor below.
+///
+/// The wall behind the camera is lit, the one behind the object is not: edges stay dark, faces bright.
 fn surround(direction: Vec3) -> f32 {
     let y = direction[1];
-    let wall = 0.10 + 0.34 * (-3.2 * y.max(0.0)).exp() + 0.16 * direction[2].max(0.0);
+    let front = 0.5 + 0.5 * direction[2];
+    let wall = 0.03 + (0.06 + 0.18 * front) * (-2.2 * y.max(0.0)).exp() + 0.05 * front;
     let floor = FLOOR * (0.75 + 0.25 * (1.0 + y.min(0.0)));
     wall + (floor - wall) * smoothstep(0.03, -0.03, y)
 }
@@ -95,7 +98,7 @@ mod tests {
     #[test]
     fn the_studio_is_neutral_and_bright_overhead() {
         let studio = Studio::new();
-        let up = studio.radiance(unit([-0.12, 1.0, 0.42]));
+        let up = studio.radiance(unit([-0.10, 1.0, 0.62]));
         assert_eq!(up[0], up[1]);
         assert!(up[0] > 8.0);
         assert!(studio.radiance([0.0, 0.0, -1.0])[0] < 1.0);

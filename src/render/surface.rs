@@ -46,12 +46,12 @@ impl Surface {
         match shape {
             Shape::Sphere => Self::Sphere,
             Shape::Capsule => {
-                let (radius, axis) = (0.46, unit([1.0, 0.0, -0.42]));
+                let (radius, axis) = (0.48, unit([1.0, 0.0, -0.16]));
                 Self::Capsule { axis, half: 1.0 - radius, radius, center: [0.0, radius - 1.0, 0.0] }
             }
             Shape::Panel => {
-                let lean = 26.0_f32.to_radians();
-                let (right, up) = (unit([1.0, 0.0, -0.20]), [0.0, lean.cos(), 0.0]);
+                let lean = 30.0_f32.to_radians();
+                let (right, up) = (unit([1.0, 0.0, -0.06]), [0.0, lean.cos(), 0.0]);
                 let back = cross(right, [0.0, 1.0, 0.0]);
                 let up = unit(along(up, back, -lean.sin()));
                 let half = [0.98, 0.72];
@@ -166,7 +166,13 @@ fn rounded_rectangle(p: [f32; 2], half: [f32; 2], corner: f32) -> (f32, [f32; 2]
     } else {
         [0.0, 1.0]
     };
-    (depth, [outward[0].copysign(p[0]) * f32::from(outward[0] != 0.0), outward[1].copysign(p[1]) * f32::from(outward[1] != 0.0)])
+    (
+        depth,
+        [
+            outward[0].copysign(p[0]) * f32::from(outward[0] != 0.0),
+            outward[1].copysign(p[1]) * f32::from(outward[1] != 0.0),
+        ],
+    )
 }
 
 /// Corners and face centres of an icosahedron in the positive octant; signs give the others.

@@ -1,6 +1,6 @@
 //! From linear light to a screen: Khronos PBR Neutral, then the sRGB curve.
 //!
-//! Khronos PBR Neutral (Khronos Group, ToneMapping repository, PBR_Neutral specification, 2024) keeps base colors under
+//! Khronos PBR Neutral (Khronos Group, `ToneMapping` repository, `PBR_Neutral` specification, 2024) keeps base colors under
 //! white light as they are and compresses only what is brighter than 0.8. With `x = min(R, G, B)`, `F90 = 0.04`,
 //! `k = 0.8 − F90`, `d = 0.15`:
 //!

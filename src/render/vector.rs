@@ -48,7 +48,6 @@ pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
 pub(super) struct Frame {
     pub(super) tangent: Vec3,
     pub(super) side: Vec3,
-    pub(super) normal: Vec3,
 }
 
 impl Frame {
@@ -56,16 +55,7 @@ impl Frame {
     pub(super) fn new(normal: Vec3, view: Vec3) -> Self {
         let across = along(view, normal, -dot(view, normal));
         let tangent = if dot(across, across) > 1e-12 { unit(across) } else { perpendicular(normal) };
-        Self { tangent, side: cross(normal, tangent), normal }
-    }
-
-    pub(super) fn local(&self, w: Vec3) -> Vec3 {
-        [dot(w, self.tangent), dot(w, self.side), dot(w, self.normal)]
-    }
-
-    pub(super) fn world(&self, w: Vec3) -> Vec3 {
-        let plane = along(scale(self.tangent, w[0]), self.side, w[1]);
-        along(plane, self.normal, w[2])
+        Self { tangent, side: cross(normal, tangent) }
     }
 }
 
@@ -80,15 +70,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_turns_there_and_back() {
+    fn a_frame_is_right_angled_and_holds_the_view() {
         let n = unit([0.3, -0.5, 0.8]);
         for view in [n, unit([0.1, 0.2, 0.9])] {
             let frame = Frame::new(n, view);
-            let w = unit([-0.4, 0.7, 0.2]);
-            for (x, y) in frame.world(frame.local(w)).iter().zip(w) {
-                assert!((x - y).abs() < 1e-6);
+            for (a, b, want) in [
+                (frame.tangent, frame.side, 0.0),
+                (frame.tangent, n, 0.0),
+                (frame.side, n, 0.0),
+                (frame.tangent, frame.tangent, 1.0),
+                (frame.side, frame.side, 1.0),
+                (frame.side, view, 0.0),
+            ] {
+                assert!((dot(a, b) - want).abs() < 1e-6);
             }
-            assert!(frame.local(view)[1].abs() < 1e-6);
+            assert!(dot(cross(frame.tangent, frame.side), n) > 0.99);
         }
     }
 }

@@ -70,6 +70,8 @@ pub struct Shelved {
     pub document: CachedResult,
     /// Blob of its file.
     pub file: Hash,
+    /// Hash of its physical content.
+    pub content: Hash,
     /// Blob of its measurement, where there was one.
     pub measurement: Option<Hash>,
 }
@@ -163,6 +165,7 @@ impl App {
         })
     }
 
+    /// From the shelf, or read once however many ask.
     async fn shelved<F>(
         &self,
         id: &str,
@@ -172,15 +175,19 @@ impl App {
     where
         F: Future<Output = Result<Option<Shelved>, Problem>>,
     {
-        if let Some(shelved) = self.shelf.get(id).await {
-            return Ok(ids::is(prefix, id).then_some(shelved));
-        }
         if !ids::is(prefix, id) {
             return Ok(None);
         }
-        let Some(shelved) = read().await?.map(Arc::new) else { return Ok(None) };
-        self.shelf.insert(id.to_owned(), Arc::clone(&shelved)).await;
-        Ok(Some(shelved))
+        if let Some(shelved) = self.shelf.get(id).await {
+            return Ok(Some(shelved));
+        }
+        // Nothing is put back on the shelf while it is being forgotten.
+        let _reading = self.removal.read().await;
+        let shelve = async { read().await.map_err(Some)?.map(Arc::new).ok_or(None) };
+        match self.shelf.try_get_with_by_ref(id, shelve).await {
+            Ok(shelved) => Ok(Some(shelved)),
+            Err(problem) => (*problem).clone().map_or(Ok(None), Err),
+        }
     }
 
     async fn read_paint(&self, id: &str) -> Result<Option<Shelved>, Problem> {
@@ -193,8 +200,8 @@ impl App {
             let thing = Thing::Paint(Box::new(file));
             let links = super::paints::links(&record);
             let document = super::documents::described(&record.id, works.describe(&thing), links);
-            let (file, measurement) = (record.paint, record.measurement);
-            Ok(Shelved { id: record.id, thing, names, document, file, measurement })
+            let PaintRecord { id, paint: file, measurement, content, .. } = record;
+            Ok(Shelved { id, thing, names, document, file, content, measurement })
         };
         self.bench.run(shelve).await?.map(Some)
     }
@@ -212,7 +219,7 @@ impl App {
             let thing = Thing::Blend(Box::new(blend));
             let links = super::blends::links(&id, &paints, &options);
             let document = super::documents::described(&id, works.describe(&thing), links);
-            Ok(Shelved { id, thing, names, document, file, measurement: None })
+            Ok(Shelved { id, thing, names, document, file, content: file, measurement: None })
         };
         self.bench.run(shelve).await?.map(Some)
     }
@@ -232,6 +239,19 @@ impl App {
         Ok(self.catalogue.paint(id).await?.is_some())
     }
 
+    /// Removes blobs that nothing names: what was uploaded in the moment before a crash.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the store fails.
+    pub async fn sweep(&self) -> Result<(), Problem> {
+        let _removing = self.removal.write().await;
+        for blob in self.blobs.all().await? {
+            self.forget_unnamed(blob).await?;
+        }
+        Ok(())
+    }
+
     /// Keeps a paint under an id. Nothing happens where the id is taken.
     ///
     /// # Errors
@@ -239,7 +259,9 @@ impl App {
     /// [`Problem`] when the store fails.
     pub async fn keep_paint(&self, id: &str, file: PaintFile, measurement: Option<Hash>) -> Result<(), Problem> {
         let _writing = self.removal.read().await;
-        let (bytes, content) = (file.to_bytes(), Hash::from(file.paint.content_hash()));
+        let hashed =
+            tokio::task::spawn_blocking(move || (file.to_bytes(), Hash::from(file.paint.content_hash()), file));
+        let (bytes, content, file) = hashed.await.map_err(Problem::internal)?;
         let paint = self.blobs.put(bytes.into()).await?.hash;
         let record = PaintRecord {
             id: id.to_owned(),

@@ -50,7 +50,7 @@ struct BlendRequest {
 /// correspondence is found once, however many ask. Another order of the same paints is another blend, whose weights
 /// follow that order, of the same correspondence.
 #[utoipa::path(
-    post, path = "/v1/blends", tag = "blends",
+    post, operation_id = "create_blend", path = "/v1/blends", tag = "blends",
     params(("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`")),
     request_body = BlendOrder,
     responses(
@@ -105,7 +105,7 @@ pub(super) async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended,
     for paint in &paints {
         shelved.push(app.paint(paint).await?);
     }
-    let (canonical, places) = in_order_of_hashes(shelved);
+    let (canonical, places) = in_order_of_hashes(&shelved);
     let names: Vec<&str> = canonical.iter().map(|paint| paint.id.as_str()).collect();
     let key = ids::key("blend", &(&names, accuracy));
     // Whichever order is asked for first finds the correspondence, the others wait for it.
@@ -142,17 +142,14 @@ async fn correspond(
     let Ok(found) = found.await? else {
         return Err(Problem::new(Kind::JobCancelled, "The job that found this correspondence was cancelled."));
     };
-    let file = found.map_err(|error| error.of_body())?;
+    let file = found.map_err(super::works::WorkError::of_body)?;
     app.metrics.blends_computed.increment(1);
     Ok(file)
 }
 
 /// Paints in the order of their physical content, and where in it the paint asked for first, second, … is.
-fn in_order_of_hashes(asked: Vec<Arc<Shelved>>) -> (Vec<Arc<Shelved>>, Vec<usize>) {
-    let key = |paint: &Arc<Shelved>| {
-        let content = paint.file_of_paint().map(|file| file.paint.content_hash().to_hex().to_string());
-        (content, paint.id.clone())
-    };
+fn in_order_of_hashes(asked: &[Arc<Shelved>]) -> (Vec<Arc<Shelved>>, Vec<usize>) {
+    let key = |paint: &Arc<Shelved>| (paint.content, paint.id.clone());
     let keys: Vec<_> = asked.iter().map(key).collect();
     let mut order: Vec<usize> = (0..asked.len()).collect();
     order.sort_by(|&x, &y| keys[x].cmp(&keys[y]));
@@ -174,7 +171,7 @@ impl Shelved {
 
 /// What is known about a blend.
 #[utoipa::path(
-    get, path = "/v1/blends/{id}", tag = "blends", params(("id" = String, Path, description = "Blend")),
+    get, operation_id = "show_blend", path = "/v1/blends/{id}", tag = "blends", params(("id" = String, Path, description = "Blend")),
     responses(
         (status = 200, description = "The blend", body = BlendDocument),
         (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),

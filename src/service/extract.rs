@@ -60,8 +60,9 @@ fn broken_body(error: &BytesRejection) -> Problem {
 fn read_json<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
     let mut reader = serde_json::Deserializer::from_slice(body);
     let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
-        let pointer = pointer(error.path());
+        let parent = pointer(error.path());
         let cause = error.into_inner();
+        let pointer = named_field(&cause).filter(|_| parent.is_empty()).map_or(parent, |name| format!("/{name}"));
         match cause.classify() {
             serde_json::error::Category::Data => Problem::value(pointer, sentence(&cause)),
             _ => Problem::new(Kind::MalformedRequest, format!("The body is not JSON: {cause}.")),
@@ -69,6 +70,13 @@ fn read_json<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
     })?;
     reader.end().map_err(|error| Problem::new(Kind::MalformedRequest, format!("The body is not JSON: {error}.")))?;
     Ok(value)
+}
+
+/// The field that an object lacks or has twice: the reader names it, but does not point at it.
+fn named_field(cause: &serde_json::Error) -> Option<String> {
+    let text = cause.to_string();
+    let rest = text.strip_prefix("missing field `").or_else(|| text.strip_prefix("duplicate field `"))?;
+    rest.split_once('`').map(|(name, _)| name.to_owned())
 }
 
 fn sentence(cause: &serde_json::Error) -> String {
@@ -147,7 +155,8 @@ mod tests {
             (r#"{"paints": ["a", 3]}"#, 422, "/paints/1"),
             (r#"{"paints": [], "surprise": 1}"#, 422, "/surprise"),
             (r#"{"paints": [], "paints": []}"#, 422, "/paints"),
-            (r"{}", 422, ""),
+            (r"{}", 422, "/paints"),
+            (r"[]", 422, ""),
         ];
         for (body, status, pointer) in cases {
             let problem = read_json::<Order>(body.as_bytes()).expect_err(body).document(None);

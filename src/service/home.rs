@@ -6,8 +6,7 @@ use super::answer::{Answer, Keep};
 use crate::studio;
 
 /// Only what this service itself serves, and pictures the page made of its answers.
-const POLICY: &str =
-    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' blob:; base-uri 'none'";
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' blob:; base-uri 'none'";
 
 /// `/`
 pub async fn page() -> Answer {

@@ -21,7 +21,7 @@ const PACE: Duration = Duration::from_millis(100);
 
 /// How a job stands.
 #[utoipa::path(
-    get, path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "Job")),
+    get, operation_id = "show_job", path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "Job")),
     responses(
         (status = 200, description = "The job", body = JobDocument),
         (status = 404, description = "There is no such job", body = ProblemDocument, content_type = "application/problem+json"),
@@ -37,7 +37,7 @@ pub async fn show(State(app): State<App>, Address(id): Address<String>, _: NoQue
 /// Server-sent events, each with the job as JSON: `progress` whenever there is some, and one `end`, after which the
 /// stream closes.
 #[utoipa::path(
-    get, path = "/v1/jobs/{id}/events", tag = "jobs", params(("id" = String, Path, description = "Job")),
+    get, operation_id = "job_events", path = "/v1/jobs/{id}/events", tag = "jobs", params(("id" = String, Path, description = "Job")),
     responses(
         (status = 200, description = "The events", body = String, content_type = "text/event-stream"),
         (status = 404, description = "There is no such job", body = ProblemDocument, content_type = "application/problem+json"),
@@ -75,7 +75,7 @@ fn tell(now: JobDocument, news: Option<watch::Receiver<JobDocument>>) -> impl St
 /// A queued job is cancelled at once, a running one at its next step. All who wait for the same paint or blend wait for
 /// the same job.
 #[utoipa::path(
-    delete, path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "Job")),
+    delete, operation_id = "cancel_job", path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "Job")),
     responses(
         (status = 200, description = "The job, cancelled or about to be", body = JobDocument),
         (status = 404, description = "There is no such job", body = ProblemDocument, content_type = "application/problem+json"),

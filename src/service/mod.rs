@@ -37,12 +37,12 @@ mod workshop;
 pub use app::App;
 pub use docs::interface;
 pub use samples::load_samples;
-pub use workshop::Workshop;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
     Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH, Thing, View,
     WorkError, Works,
 };
+pub use workshop::Workshop;
 
 use std::path::PathBuf;
 use std::time::Duration;

@@ -27,6 +27,10 @@ use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
 /// Longest silence in the middle of an upload.
 const SILENCE: Duration = Duration::from_secs(30);
 
+/// Longest time that a refused upload is still taken in, and most bytes of it.
+const PATIENCE: Duration = Duration::from_secs(5);
+const MOST_DRAINED: usize = 64 << 20;
+
 /// Longest name of a paint, characters.
 const LONGEST_NAME: usize = 200;
 
@@ -140,7 +144,7 @@ pub(super) fn accuracy(
 /// answers at once. `Prefer: wait=N` waits up to N seconds for the paint; otherwise what takes more than 3 seconds is
 /// answered with the job that goes on.
 #[utoipa::path(
-    post, path = "/v1/paints", tag = "paints", params(IngestQuery,
+    post, operation_id = "upload_paint", path = "/v1/paints", tag = "paints", params(IngestQuery,
         ("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`")),
     request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "The measurement"),
     responses(
@@ -154,13 +158,19 @@ pub(super) fn accuracy(
 )]
 pub async fn upload(
     State(app): State<App>,
-    Query(query): Query<IngestQuery>,
+    query: Result<Query<IngestQuery>, Problem>,
     prefer: Prefer,
     request: Request,
 ) -> Result<Response, Problem> {
-    let order = query.order()?;
     let (parts, body) = request.into_parts();
-    check_headers(&app, &parts.headers)?;
+    let order = query.and_then(|Query(query)| query.order());
+    let order = match order.and_then(|order| check_headers(&app, &parts.headers).map(|()| order)) {
+        Ok(order) => order,
+        Err(problem) => {
+            let _ = tokio::time::timeout(PATIENCE, drain(body)).await;
+            return Err(problem);
+        }
+    };
     let received = receive(&app, body).await?;
     // Until a job names the upload it must not be swept as nobody's.
     let naming = app.removal.read().await;
@@ -205,6 +215,18 @@ fn check_headers(app: &App, headers: &HeaderMap) -> Result<(), Problem> {
 fn too_large(app: &App) -> Problem {
     Problem::new(Kind::TooLarge, "The upload is too large.")
         .accepting(format!("up to {} bytes", app.config.limits.bytes))
+}
+
+/// Takes in what is refused: who still sends does not listen.
+async fn drain(body: Body) {
+    let mut pieces = body.into_data_stream();
+    let mut length = 0;
+    while let Some(Ok(piece)) = pieces.next().await {
+        length += piece.len();
+        if length > MOST_DRAINED {
+            return;
+        }
+    }
 }
 
 /// Streams a body into a blob that is still to be finished.
@@ -255,7 +277,7 @@ pub(super) async fn ingest(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended
         fitted.map_err(|error| error.without(&folder))
     });
     let Ok(fitted) = fitted.await? else { return Ok(Err(CalledOff)) };
-    let file = fitted.map_err(|error| error.of_upload())?;
+    let file = fitted.map_err(super::works::WorkError::of_upload)?;
     app.metrics.paints_fitted.increment(1);
     under_way.stage("storing");
     app.keep_paint(id, file, Some(upload)).await.map(Ok)
@@ -269,7 +291,7 @@ pub(super) async fn forget_upload(app: &App, job: &JobRecord) -> Result<(), Prob
 
 /// List paints.
 #[utoipa::path(
-    get, path = "/v1/paints", tag = "paints", params(ListQuery),
+    get, operation_id = "list_paints", path = "/v1/paints", tag = "paints", params(ListQuery),
     responses(
         (status = 200, description = "A page of paints", body = PaintList),
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
@@ -313,7 +335,7 @@ fn summary(record: PaintRecord) -> PaintSummary {
 ///
 /// Provenance, parameters, fit residuals with their floor, energy certificate, flake statistics, warnings.
 #[utoipa::path(
-    get, path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    get, operation_id = "show_paint", path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 200, description = "The paint", body = PaintDocument),
         (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
@@ -327,7 +349,7 @@ pub async fn show(State(app): State<App>, Address(id): Address<String>, _: NoQue
 
 /// A paint as a `.paint` file.
 #[utoipa::path(
-    get, path = "/v1/paints/{id}/paint", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    get, operation_id = "paint_file", path = "/v1/paints/{id}/paint", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 200, description = "The file", body = Vec<u8>, content_type = "application/vnd.carpaint.paint"),
         (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
@@ -343,7 +365,7 @@ pub async fn file(State(app): State<App>, Address(id): Address<String>, _: NoQue
 
 /// The measurement a paint was made of: the very bytes that were uploaded.
 #[utoipa::path(
-    get, path = "/v1/paints/{id}/measurement", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    get, operation_id = "paint_measurement", path = "/v1/paints/{id}/measurement", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 200, description = "The bytes", body = Vec<u8>, content_type = "application/octet-stream"),
         (status = 404, description = "There is no such paint, or it had no measurement", body = ProblemDocument, content_type = "application/problem+json"),
@@ -361,7 +383,7 @@ pub async fn measurement(State(app): State<App>, Address(id): Address<String>, _
 
 /// Delete a paint with its measurement. Blends that were made of it stay.
 #[utoipa::path(
-    delete, path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
+    delete, operation_id = "delete_paint", path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 204, description = "It is gone"),
         (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),

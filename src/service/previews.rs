@@ -14,7 +14,8 @@ use super::extract::{Address, Query, QueryOfTwo};
 use super::ids;
 use super::problem::{Problem, ProblemDocument};
 use super::weights::WeightQuery;
-use super::works::{Accuracy, PictureFormat, Preset, Scene, View};
+use super::works::{Accuracy, PictureFormat, Preset, Scene, View, WorkError};
+use super::workshop::profile;
 use crate::blend::RealisationWeights;
 
 /// Longest side of a picture.
@@ -64,23 +65,27 @@ impl ViewQuery {
     fn view(&self, app: &App) -> Result<View, Problem> {
         let Size(size) = self.size.unwrap_or(Size([512, 512]));
         let most = app.config.limits.samples;
-        if let Some(spp) = self.spp
-            && !(1..=most).contains(&spp)
-        {
-            return Err(Problem::parameter("spp", format!("spp is {spp}.")).accepting(format!("1 to {most}")));
-        }
-        let samples = u64::from(size[0]) * u64::from(size[1]) * u64::from(self.spp.unwrap_or(1));
-        if samples > MOST_SAMPLES {
-            let detail = format!("{} x {} pixels with this many samples each is too much.", size[0], size[1]);
+        let spp = match self.spp {
+            Some(spp) if (1..=most).contains(&spp) => spp,
+            Some(spp) => {
+                return Err(Problem::parameter("spp", format!("spp is {spp}.")).accepting(format!("1 to {most}")));
+            }
+            None => {
+                let accuracy = Accuracy { profile: self.profile.unwrap_or_default(), clusters: None };
+                profile(accuracy).map_err(|error| WorkError::from(error).of_query())?.samples_per_pixel
+            }
+        };
+        if u64::from(size[0]) * u64::from(size[1]) * u64::from(spp) > MOST_SAMPLES {
+            let detail = format!("{} x {} pixels with {spp} samples each are too much.", size[0], size[1]);
             return Err(Problem::parameter("spp", detail).accepting(format!("up to {MOST_SAMPLES} samples in all")));
         }
-        Ok(View { scene: self.scene.unwrap_or_default(), size, samples_per_pixel: self.spp })
+        Ok(View { scene: self.scene.unwrap_or_default(), size, samples_per_pixel: spp })
     }
 }
 
 /// A picture of a blend at some weights.
 #[utoipa::path(
-    get, path = "/v1/blends/{id}/preview.{format}", tag = "previews",
+    get, operation_id = "preview_blend", path = "/v1/blends/{id}/preview.{format}", tag = "previews",
     params(("id" = String, Path, description = "Blend"), ("format" = PictureFormat, Path, description = "Picture"), WeightQuery, ViewQuery),
     responses(
         (status = 200, description = "The picture", content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
@@ -101,7 +106,7 @@ pub async fn of_blend(
 
 /// A picture of a paint.
 #[utoipa::path(
-    get, path = "/v1/paints/{id}/preview.{format}", tag = "previews",
+    get, operation_id = "preview_paint", path = "/v1/paints/{id}/preview.{format}", tag = "previews",
     params(("id" = String, Path, description = "Paint"), ("format" = PictureFormat, Path, description = "Picture"), ViewQuery),
     responses(
         (status = 200, description = "The picture", content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
@@ -127,14 +132,12 @@ async fn draw(
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let view = query.view(app)?;
-    let accuracy = Accuracy { profile: query.profile.unwrap_or_default(), clusters: None };
-    let key = ids::key("preview", &(&thing.id, thing.file.to_string(), &weights, view, format, accuracy));
+    let key = ids::key("preview", &(&thing.id, thing.file.to_string(), &weights, view, format));
     let on = app.clone();
     let compute = move || async move {
         let (works, counter) = (Arc::clone(&on.works), on.metrics.previews_rendered.clone());
-        let drawn =
-            on.bench.run(move || works.preview(&thing.thing, weights.as_ref(), &view, format, accuracy)).await?;
-        let bytes = drawn.map_err(|error| error.of_query())?;
+        let drawn = on.bench.run(move || works.preview(&thing.thing, weights.as_ref(), &view, format)).await?;
+        let bytes = drawn.map_err(super::works::WorkError::of_query)?;
         counter.increment(1);
         Ok(bytes.into())
     };

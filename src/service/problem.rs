@@ -342,12 +342,7 @@ fn of_status(response: &Response) -> Problem {
         StatusCode::NOT_FOUND => Problem::new(Kind::UnknownAddress, "There is nothing at this address.")
             .accepting("the addresses listed in /openapi.json"),
         StatusCode::METHOD_NOT_ALLOWED => {
-            let allowed = response.headers().get(header::ALLOW).and_then(|value| value.to_str().ok());
-            let problem = Problem::new(Kind::MethodNotAllowed, "This address does not take this method.");
-            match allowed {
-                Some(allowed) => problem.accepting(allowed.replace(',', ", ")),
-                None => problem,
-            }
+            Problem::new(Kind::MethodNotAllowed, "This address does not take this method.")
         }
         StatusCode::REQUEST_TIMEOUT => Problem::new(Kind::RequestTimeout, "The request did not come in time."),
         StatusCode::PAYLOAD_TOO_LARGE => Problem::new(Kind::TooLarge, "The request's body is too large."),

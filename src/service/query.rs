@@ -6,8 +6,8 @@
 use std::cell::Cell;
 use std::fmt::{self, Display};
 
-use serde::de::value::{MapDeserializer, SeqDeserializer, StrDeserializer};
-use serde::de::{self, DeserializeOwned, IntoDeserializer, Visitor};
+use serde::de::value::{MapAccessDeserializer, SeqDeserializer, StrDeserializer};
+use serde::de::{self, DeserializeOwned, DeserializeSeed, IntoDeserializer, MapAccess, Visitor};
 use serde::forward_to_deserialize_any;
 
 use super::problem::{Kind, Problem};
@@ -107,11 +107,29 @@ pub fn refuse_unknown(pairs: &[Pair], known: &[&str]) -> Result<(), Problem> {
 /// Reads the parameters that `T` has; others are left to others.
 pub fn read<T: DeserializeOwned>(pairs: &[Pair]) -> Result<T, Problem> {
     let names = names::<T>();
-    let own = pairs
-        .iter()
-        .filter(|(name, _)| names.contains(&name.as_str()))
-        .map(|(name, text)| (name.as_str(), Text { name, text }));
-    T::deserialize(MapDeserializer::new(own)).map_err(Refusal::problem)
+    let own = pairs.iter().filter(|(name, _)| names.contains(&name.as_str()));
+    T::deserialize(MapAccessDeserializer::new(Own { rest: own, value: None })).map_err(Refusal::problem)
+}
+
+/// The parameters of one struct. Whatever a value is refused for carries its name.
+struct Own<'a, I> {
+    rest: I,
+    value: Option<Text<'a>>,
+}
+
+impl<'de, 'a, I: Iterator<Item = &'a Pair>> MapAccess<'de> for Own<'a, I> {
+    type Error = Refusal;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Refusal> {
+        let Some((name, text)) = self.rest.next() else { return Ok(None) };
+        self.value = Some(Text { name, text });
+        seed.deserialize(name.as_str().into_deserializer()).map(Some)
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
+        let Some(value) = self.value.take() else { return Err(de::Error::custom("a value before its name")) };
+        seed.deserialize(value).map_err(|error| error.of(value.name))
+    }
 }
 
 /// Names of the fields of a struct, as serde knows them.
@@ -154,7 +172,7 @@ struct Text<'a> {
     text: &'a str,
 }
 
-impl<'de> IntoDeserializer<'de, Refusal> for Text<'_> {
+impl IntoDeserializer<'_, Refusal> for Text<'_> {
     type Deserializer = Self;
 
     fn into_deserializer(self) -> Self {
@@ -176,7 +194,7 @@ impl Text<'_> {
 macro_rules! whole_numbers {
     ($($method:ident $visit:ident)*) => {$(
         fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-            visitor.$visit(self.number("a whole number in range")?).map_err(|error: Refusal| error.of(self.name))
+            visitor.$visit(self.number("a whole number in range")?)
         }
     )*};
 }
@@ -198,7 +216,7 @@ impl<'de> de::Deserializer<'de> for Text<'_> {
         if !value.is_finite() {
             return Err(self.refuse("a finite number"));
         }
-        visitor.visit_f64(value).map_err(|error: Refusal| error.of(self.name))
+        visitor.visit_f64(value)
     }
 
     fn deserialize_bool<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
@@ -219,7 +237,7 @@ impl<'de> de::Deserializer<'de> for Text<'_> {
 
     fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
         let parts = self.text.split(',').map(|text| Text { name: self.name, text });
-        visitor.visit_seq(SeqDeserializer::new(parts)).map_err(|error: Refusal| error.of(self.name))
+        visitor.visit_seq(SeqDeserializer::new(parts))
     }
 
     fn deserialize_enum<V: Visitor<'de>>(
@@ -229,11 +247,11 @@ impl<'de> de::Deserializer<'de> for Text<'_> {
         visitor: V,
     ) -> Result<V::Value, Refusal> {
         let variant: StrDeserializer<'_, Refusal> = self.text.into_deserializer();
-        visitor.visit_enum(variant).map_err(|error: Refusal| error.of(self.name))
+        visitor.visit_enum(variant)
     }
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        visitor.visit_str(self.text).map_err(|error: Refusal| error.of(self.name))
+        visitor.visit_str(self.text)
     }
 
     forward_to_deserialize_any! {

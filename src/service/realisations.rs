@@ -29,7 +29,7 @@ pub struct ProfileQuery {
 /// `zip` is the texture bundle with its shader, `glb` a glTF binary, `json` the bundle's `material.json` with the
 /// textures inline, `paint` a paint that can be blended again.
 #[utoipa::path(
-    get, path = "/v1/blends/{id}/realisation.{format}", tag = "realisations",
+    get, operation_id = "realise_blend", path = "/v1/blends/{id}/realisation.{format}", tag = "realisations",
     params(("id" = String, Path, description = "Blend"), ("format" = Format, Path, description = "File"), WeightQuery, ProfileQuery),
     responses(
         (status = 200, description = "The file", content(
@@ -52,7 +52,7 @@ pub async fn of_blend(
 
 /// A paint as a file.
 #[utoipa::path(
-    get, path = "/v1/paints/{id}/realisation.{format}", tag = "realisations",
+    get, operation_id = "realise_paint", path = "/v1/paints/{id}/realisation.{format}", tag = "realisations",
     params(("id" = String, Path, description = "Paint"), ("format" = Format, Path, description = "File"), ProfileQuery),
     responses(
         (status = 200, description = "The file", content(
@@ -86,7 +86,7 @@ async fn realise(
     let compute = move || async move {
         let (works, counter) = (Arc::clone(&on.works), on.metrics.realisations_computed.clone());
         let made = on.bench.run(move || works.realise(&thing.thing, weights.as_ref(), format, accuracy)).await?;
-        let bytes = made.map_err(|error| error.of_query())?;
+        let bytes = made.map_err(super::works::WorkError::of_query)?;
         counter.increment(1);
         Ok(bytes.into())
     };

@@ -28,8 +28,8 @@ pub enum ServeError {
     /// The store.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The jobs that were under way could not be read.
-    #[error("the jobs on record could not be begun again")]
+    /// What the last process left behind could not be tidied up or gone on with.
+    #[error("the jobs on record could not be begun again; the log says why")]
     Jobs,
     /// The address.
     #[error("cannot listen on {address}: {source}")]
@@ -48,12 +48,12 @@ pub enum ServeError {
 /// [`ServeError`] when the data folder is in use, full, or not this program's.
 pub async fn open(config: ServiceConfig, works: Arc<dyn Works>) -> Result<App, ServeError> {
     let app = App::open(config, works).await?;
+    app.sweep().await.map_err(|_| ServeError::Jobs)?;
     runner::resume(&app).await.map_err(|_| ServeError::Jobs)?;
     Ok(app)
 }
 
 /// All addresses.
-#[must_use]
 pub fn router(app: App) -> Router {
     Router::new()
         .route("/v1/paints", get(paints::list).post(paints::upload))
@@ -80,6 +80,7 @@ pub fn router(app: App) -> Router {
         .route("/openapi.json", get(docs::openapi))
         .route("/problems/{kind}", get(docs::problem))
         .fallback(|| async { axum::http::StatusCode::NOT_FOUND })
+        .method_not_allowed_fallback(docs::method_not_allowed)
         // Uploads hold themselves to their own limit, piece by piece.
         .layer(DefaultBodyLimit::max(JSON_BYTES))
         .layer(middleware::from_fn_with_state(app.clone(), envelope))

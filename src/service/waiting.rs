@@ -1,7 +1,7 @@
 //! How long a caller waits for a job, and what is answered then.
 
 use std::convert::Infallible;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
@@ -21,7 +21,7 @@ pub struct Prefer {
 }
 
 /// Longest wait that is granted.
-const LONGEST: Duration = Duration::from_secs(300);
+const LONGEST: Duration = Duration::from_mins(5);
 
 /// Wait of a caller who has no preference: quick work is answered at once, and so are quick refusals.
 const UNASKED: Duration = Duration::from_secs(3);
@@ -64,7 +64,9 @@ impl Prefer {
     where
         F: Future<Output = Result<CachedResult, Problem>>,
     {
+        let begun = Instant::now();
         let job = runner::wait_for(app, job, self.wait.unwrap_or(UNASKED)).await?;
+        let waited = begun.elapsed();
         let answer = match job.state {
             JobState::Done => Answer::result("application/json", made().await?, Keep::Revalidated)
                 .status(StatusCode::CREATED)
@@ -80,6 +82,7 @@ impl Prefer {
                 Answer::json(&job, Keep::Never).status(StatusCode::ACCEPTED).location(&format!("/v1/jobs/{}", job.id))
             }
         };
+        let answer = answer.stage("job", waited);
         let applied = match self.wait {
             None => return Ok(answer.into_response()),
             Some(Duration::ZERO) => "respond-async".to_owned(),

@@ -123,8 +123,8 @@ pub struct View {
     pub scene: Scene,
     /// Pixels across and down.
     pub size: [u32; 2],
-    /// Samples per pixel, in place of the profile's.
-    pub samples_per_pixel: Option<u32>,
+    /// Samples per pixel.
+    pub samples_per_pixel: u32,
 }
 
 /// Whose fault it is.
@@ -190,7 +190,6 @@ pub trait Works: Debug + Send + Sync {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
-        accuracy: Accuracy,
     ) -> Result<Vec<u8>, WorkError>;
 
     /// What is known about a paint or a blend.

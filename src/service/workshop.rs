@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH, Thing, View, WorkError,
-    Works,
+    Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH, Thing, View,
+    WorkError, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
@@ -39,7 +39,8 @@ impl From<WorkshopError> for WorkError {
     }
 }
 
-fn profile(accuracy: Accuracy) -> Result<Profile, WorkshopError> {
+/// The settings of an accuracy.
+pub(super) fn profile(accuracy: Accuracy) -> Result<Profile, WorkshopError> {
     let preset = match accuracy.profile {
         Preset::Draft => Profile::draft(),
         Preset::Standard => Profile::standard(),
@@ -102,7 +103,6 @@ impl Works for Workshop {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
-        accuracy: Accuracy,
     ) -> Result<Vec<u8>, WorkError> {
         let scene = match view.scene {
             Scene::Sphere => "sphere",
@@ -112,7 +112,7 @@ impl Works for Workshop {
         let options = PreviewOptions {
             scene: scene.to_owned(),
             size: view.size,
-            samples_per_pixel: view.samples_per_pixel.unwrap_or(profile(accuracy)?.samples_per_pixel),
+            samples_per_pixel: view.samples_per_pixel,
             environment: None,
         };
         let format = match format {

@@ -57,6 +57,9 @@ pub trait Blobs: Send + Sync {
     /// Forgets a blob. Forgetting what is not there is no error.
     fn remove(&self, hash: Hash) -> Task<'_, ()>;
 
+    /// Names of all blobs, in no order.
+    fn all(&self) -> Task<'_, Vec<Hash>>;
+
     /// Writes a small blob at once.
     fn put(&self, bytes: Bytes) -> Task<'_, Stored> {
         Box::pin(async move {

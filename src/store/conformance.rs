@@ -38,6 +38,11 @@ async fn blobs_conform(blobs: &dyn Blobs) {
     let nothing = blobs.put(Bytes::new()).await.expect("an empty blob is a blob");
     assert_eq!(blobs.read(nothing.hash).await.expect("reads"), Some(Bytes::new()));
 
+    let mut all = blobs.all().await.expect("lists");
+    all.sort();
+    let mut want = vec![hash, nothing.hash];
+    want.sort();
+    assert_eq!(all, want);
     blobs.remove(hash).await.expect("removes");
     blobs.remove(hash).await.expect("removing nothing is no error");
     assert!(blobs.read(hash).await.expect("reads").is_none());

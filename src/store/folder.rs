@@ -65,6 +65,20 @@ fn place(blobs: &Path, hash: Hash) -> PathBuf {
     blobs.join(&name[..2]).join(name)
 }
 
+/// Names in the folders of `blobs`. Files of other names are not ours.
+fn names(blobs: &Path) -> io::Result<Vec<Hash>> {
+    let mut names = Vec::new();
+    for folder in fs::read_dir(blobs)? {
+        let folder = folder?;
+        if folder.file_type()?.is_dir() {
+            for file in fs::read_dir(folder.path())? {
+                names.extend(file?.file_name().to_str().and_then(|name| name.parse::<Hash>().ok()));
+            }
+        }
+    }
+    Ok(names)
+}
+
 /// `None` instead of "not found".
 fn found<T>(result: io::Result<T>, hash: Hash) -> Result<Option<T>, StoreError> {
     match result {
@@ -132,6 +146,11 @@ impl Blobs for FolderBlobs {
     fn remove(&self, hash: Hash) -> Task<'_, ()> {
         let path = self.place(hash);
         Box::pin(async move { found(tokio::fs::remove_file(path).await, hash).map(|_| ()) })
+    }
+
+    fn all(&self) -> Task<'_, Vec<Hash>> {
+        let blobs = self.blobs.clone();
+        Box::pin(async move { off_thread(move || names(&blobs)).await.map_err(StoreError::io("listing the blobs")) })
     }
 }
 

@@ -26,7 +26,8 @@ pub fn blend_paints(
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Blended, WorkshopError> {
     let mut notes = Vec::new();
-    let reduced: Vec<Option<CarPaint>> = paints.iter().map(|file| reduced(file, profile.flakes.clusters, &mut notes)).collect();
+    let reduced: Vec<Option<CarPaint>> =
+        paints.iter().map(|file| reduced(file, profile.flakes.clusters, &mut notes)).collect();
     let ingredients: Vec<Ingredient<'_>> = paints
         .iter()
         .zip(&reduced)

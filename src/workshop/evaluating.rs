@@ -34,8 +34,9 @@ impl Pairs {
     ///
     /// [`WorkshopError`] for JSON that is none, too many pairs, or a vector that is not of unit length to 1e-3.
     pub fn from_json(name: &str, json: &[u8], limits: &Limits) -> Result<Self, WorkshopError> {
-        let mut pairs: Self = serde_json::from_slice(json)
-            .map_err(|e| WorkshopError::input(name, format!("{e}; accepted is {{\"pairs\": [[[ix,iy,iz],[ox,oy,oz]], …]}}")))?;
+        let mut pairs: Self = serde_json::from_slice(json).map_err(|e| {
+            WorkshopError::input(name, format!("{e}; accepted is {{\"pairs\": [[[ix,iy,iz],[ox,oy,oz]], …]}}"))
+        })?;
         if pairs.pairs.len() > limits.pairs {
             let problem = format!("{} pairs, accepted are up to {}", pairs.pairs.len(), limits.pairs);
             return Err(WorkshopError::input(name, problem));
@@ -59,9 +60,10 @@ impl Pairs {
 pub fn evaluate(paint: &CarPaint, pairs: &Pairs, chi: Chi) -> Values {
     let reflectance = Reflectance::new(paint);
     let f = pairs.pairs.iter().map(|&[wi, wo]| Some(reflectance.evaluate(wi, wo, chi))).collect();
-    let mirror = paint.coat.filter(crate::paint::Coat::is_mirror).map(|_| {
-        pairs.pairs.iter().map(|&[wi, wo]| if wi[2] > 0.0 { reflectance.mirror(wo) } else { 0.0 }).collect()
-    });
+    let mirror = paint
+        .coat
+        .filter(crate::paint::Coat::is_mirror)
+        .map(|_| pairs.pairs.iter().map(|&[wi, wo]| if wi[2] > 0.0 { reflectance.mirror(wo) } else { 0.0 }).collect());
     Values { f, mirror }
 }
 
@@ -81,7 +83,8 @@ pub fn evaluate_raw(measurement: &Measurement, pairs: &Pairs) -> Result<Values, 
 
 fn raw_package(package: &Package, pairs: &Pairs) -> Result<Vec<Option<[f64; 3]>>, WorkshopError> {
     let wrong = |problem: &dyn std::fmt::Display| WorkshopError::input(&package.name, problem);
-    let means = package.flakes.as_ref().map(|slices| slices.mean_colors()).transpose().map_err(|e| wrong(&e))?;
+    let means =
+        package.flakes.as_ref().map(crate::measurement::FlakeSlices::mean_colors).transpose().map_err(|e| wrong(&e))?;
     let flakes = |half: &HalfAngles| match (&package.flakes, &means) {
         (Some(slices), Some(means)) => at_angles(means, slices.theta_h(), slices.theta_d(), half),
         _ => [0.0; 3],

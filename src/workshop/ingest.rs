@@ -174,13 +174,9 @@ fn ingest_package(
                         readings alone yet"
                 .to_owned());
         }
-        Some(PackageBase::Model { diffuse, lobes, color_table }) => CarPaint {
-            coat,
-            diffuse: *diffuse,
-            lobes: lobes.clone(),
-            color_table: color_table.clone(),
-            flakes: None,
-        },
+        Some(PackageBase::Model { diffuse, lobes, color_table }) => {
+            CarPaint { coat, diffuse: *diffuse, lobes: lobes.clone(), color_table: color_table.clone(), flakes: None }
+        }
         Some(base @ PackageBase::Table { file, .. }) => {
             let table = table_of(base)?;
             let choice = CoatChoice::Inside(coat.map_or(1.0, |c| c.ior));
@@ -241,7 +237,9 @@ pub(super) fn finish(
     let energy = certify(&paint);
     if !energy.conserves {
         let most = energy.albedo.iter().copied().fold(0.0, f64::max);
-        warnings.push(format!("the paint reflects up to {most:.2} times the light it gets: the measurement may be uncalibrated"));
+        warnings.push(format!(
+            "the paint reflects up to {most:.2} times the light it gets: the measurement may be uncalibrated"
+        ));
     }
     PaintFile { name, provenance, paint, clustering, residuals, energy, warnings }
 }

@@ -74,7 +74,10 @@ pub fn preview(
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Made, WorkshopError> {
     let shape: Shape = serde_json::from_value(json!(options.scene)).map_err(|_| {
-        WorkshopError::usage("scene", format!("there is no scene '{}'; there are sphere, capsule and panel", options.scene))
+        WorkshopError::usage(
+            "scene",
+            format!("there is no scene '{}'; there are sphere, capsule and panel", options.scene),
+        )
     })?;
     let mut scene = Scene::new(shape, options.size);
     scene.samples_per_pixel = options.samples_per_pixel;

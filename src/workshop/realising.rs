@@ -126,10 +126,11 @@ pub fn realise(
         return Ok(Made { bytes: file.to_bytes(), report: json!({ "paint": file.name }), notes: Vec::new() });
     }
     let chosen = choose(thing, weights)?;
-    let about = About { name: chosen.name.clone(), provenance: chosen.provenance.clone(), report: chosen.report.clone() };
+    let about =
+        About { name: chosen.name.clone(), provenance: chosen.provenance.clone(), report: chosen.report.clone() };
     let bytes = match format {
         Format::Zip => export::bundle(&chosen.paint, &about, &profile.export),
-        Format::Glb => export::material_json(&chosen.paint, &about, &profile.export),
+        Format::Glb => export::glb(&chosen.paint, &about, &profile.export),
         Format::Json => export::material_json(&chosen.paint, &about, &profile.export),
         Format::Paint => {
             return Ok(Made { bytes: paint_file(&chosen).to_bytes(), report: chosen.report, notes: chosen.notes });
@@ -141,11 +142,11 @@ pub fn realise(
 
 /// A realised paint as a paint of its own.
 fn paint_file(chosen: &Chosen) -> PaintFile {
-    let clustering = chosen
-        .paint
-        .flakes
-        .as_ref()
-        .map(|f| Clustering { clusters: f.widest_slice(), box_rule: "blended".to_owned(), w1: None });
+    let clustering = chosen.paint.flakes.as_ref().map(|f| Clustering {
+        clusters: f.widest_slice(),
+        box_rule: "blended".to_owned(),
+        w1: None,
+    });
     PaintFile {
         name: chosen.name.chars().take(200).collect(),
         provenance: chosen.provenance.clone(),

@@ -4,9 +4,9 @@
 //! Car Paint", VMV 2005: fitted diffuse albedo, and three lobes with weight per channel, reflectance at normal incidence
 //! and roughness, in air, lacquer included. Read as this crate's lobes: s = ks, F0 = r, α = m.
 //!
-//! Which of them are metallic, the figures say: in ford_f8, polaris_silber, opel_titan and bmw339 a wide lobe (α of 0.1
+//! Which of them are metallic, the figures say: in `ford_f8`, `polaris_silber`, `opel_titan` and `bmw339` a wide lobe (α of 0.1
 //! and more) reflects several times what the diffuse albedo does, which is aluminium; they get simulated flakes. White,
-//! 2k_acrylack (a plain two-component acrylic), blue and blue_matte carry their color in the diffuse albedo under lobes
+//! `2k_acrylack` (a plain two-component acrylic), blue and `blue_matte` carry their color in the diffuse albedo under lobes
 //! of a lacquer's reflectance or of little weight: they are solid colors.
 
 use std::ops::ControlFlow;

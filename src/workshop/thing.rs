@@ -41,9 +41,9 @@ pub fn find(name: &str) -> Result<Source, WorkshopError> {
     if path.exists() {
         return Ok(Source::Path(path.to_owned()));
     }
-    samples::by_name(name)
-        .map(Source::Sample)
-        .ok_or_else(|| WorkshopError::input(name, format!("no such file, and no sample of this name; samples are {}", known())))
+    samples::by_name(name).map(Source::Sample).ok_or_else(|| {
+        WorkshopError::input(name, format!("no such file, and no sample of this name; samples are {}", known()))
+    })
 }
 
 /// Reads the bytes of a file, its name in every error.
@@ -78,7 +78,11 @@ pub(super) fn first_bytes(path: &Path) -> Result<Vec<u8>, WorkshopError> {
 /// # Errors
 ///
 /// [`WorkshopError`] for a name that is nothing, a damaged file, a blend, or clusters other than asked for.
-pub fn open_paint(name: &str, options: &IngestOptions, progress: &(dyn Fn(f32) + Sync)) -> Result<PaintFile, WorkshopError> {
+pub fn open_paint(
+    name: &str,
+    options: &IngestOptions,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<PaintFile, WorkshopError> {
     match open(name, options, progress)? {
         Thing::Paint(paint) => Ok(*paint),
         Thing::Blend(_) => {
@@ -119,7 +123,10 @@ impl Thing {
     /// # Errors
     ///
     /// [`WorkshopError`] for weights that the blend refuses.
-    pub fn realise(self, weights: impl FnOnce(&Blend) -> Result<Option<RealisationWeights>, WorkshopError>) -> Result<Realised<CarPaint>, WorkshopError> {
+    pub fn realise(
+        self,
+        weights: impl FnOnce(&Blend) -> Result<Option<RealisationWeights>, WorkshopError>,
+    ) -> Result<Realised<CarPaint>, WorkshopError> {
         match self {
             Self::Paint(file) => Ok(Realised { paint: file.paint, clamps: Vec::new(), weight_sums: [1.0; 3] }),
             Self::Blend(blend) => match weights(&blend)? {

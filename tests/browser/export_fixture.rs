@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use carpaint::color::Lab;
-use carpaint::export::{About, ExportSettings, Precision, bundle, material_json};
+use carpaint::export::{About, ExportSettings, Precision, bundle, glb, material_json};
 use carpaint::paint::{
     AngleGrid, CarPaint, Chi, Coat, ColorTable, Direction, FlakeSampler, FlakeTexture, Flakes, Lobe, Provenance,
     RandomTexture, Reflectance, half_angles, refract,
@@ -31,6 +31,7 @@ fn main() -> Result<(), Anything> {
         }
         let settings = ExportSettings::default();
         std::fs::write(folder.join(format!("{name}.json")), material_json(&paint, &about, &settings)?)?;
+        std::fs::write(folder.join(format!("{name}.glb")), glb(&paint, &about, &settings)?)?;
         std::fs::write(folder.join(format!("{name}_expected.json")), serde_json::to_vec(&expected(&paint))?)?;
     }
     Ok(())
@@ -69,7 +70,7 @@ fn expected(paint: &CarPaint) -> Value {
             #[allow(clippy::cast_possible_truncation)]
             let angles = [half.theta_h.to_degrees(), half.theta_d.to_degrees()].map(|a| a as f32);
             let cell = tile.at(x, y);
-            let color = sampler.color(cell, f64::from(angles[0]), f64::from(angles[1]));
+            let color = sampler.color(cell, angles[0], angles[1]);
             json!({"texel": [x, y], "cell": cell, "angles": angles, "color": color})
         })
         .collect();

@@ -128,8 +128,11 @@ fn previews_are_drawn_in_the_size_asked_for() {
 #[test]
 fn evaluation_reads_pairs_and_writes_values() {
     let desk = Desk::new();
-    fs::write(desk.path("d.json"), r#"{"pairs": [[[0,0,1],[0,0,1]], [[0.6,0,0.8],[0,0.6,0.8]], [[0.6,0,0.8],[0,0.6,-0.8]]]}"#)
-        .expect("written");
+    fs::write(
+        desk.path("d.json"),
+        r#"{"pairs": [[[0,0,1],[0,0,1]], [[0.6,0,0.8],[0,0.6,0.8]], [[0.6,0,0.8],[0,0.6,-0.8]]]}"#,
+    )
+    .expect("written");
     desk.ok(&["evaluate", "sample:white", "--directions", "d.json", "--out", "v.json"]);
     let values = json(&desk.read("v.json"));
     assert_eq!(values["f"].as_array().map(Vec::len), Some(3));
@@ -137,7 +140,10 @@ fn evaluation_reads_pairs_and_writes_values() {
     assert_eq!(values["f"][2], serde_json::json!([0.0, 0.0, 0.0]));
     for bad in ["{", r#"{"pairs": [[[0,0,2],[0,0,1]]]}"#, r#"{"pears": []}"#] {
         fs::write(desk.path("bad.json"), bad).expect("written");
-        assert!(desk.refused(3, &["evaluate", "sample:white", "--directions", "bad.json", "--out", "w.json"]).contains("bad.json"));
+        assert!(
+            desk.refused(3, &["evaluate", "sample:white", "--directions", "bad.json", "--out", "w.json"])
+                .contains("bad.json")
+        );
     }
     let said = desk.refused(3, &["evaluate", "sample:white", "--raw", "--directions", "d.json", "--out", "w.json"]);
     assert!(said.contains("no measurement"), "{said}");

@@ -1,7 +1,12 @@
 //! The documentation: `/openapi.json`, a page that shows it without the internet, and what each problem means.
 
-use axum::http::{HeaderName, header};
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
+use axum::extract::MatchedPath;
+use axum::http::{HeaderName, Method, header};
 use utoipa::OpenApi;
+use utoipa::openapi::PathItem;
 
 use super::answer::{Answer, Keep};
 use super::extract::Address;
@@ -50,10 +55,29 @@ pub struct Interface;
 ///
 /// Never: the interface is plain data.
 #[must_use]
-pub fn interface() -> String {
-    let mut text = Interface::openapi().to_pretty_json().expect("plain data serialises");
-    text.push('\n');
-    text
+pub fn interface() -> &'static str {
+    static TEXT: LazyLock<String> = LazyLock::new(|| {
+        let mut text = Interface::openapi().to_pretty_json().expect("plain data serialises");
+        text.push('\n');
+        text
+    });
+    &TEXT
+}
+
+/// What answers a method that an address does not take.
+pub async fn method_not_allowed(path: MatchedPath, method: Method) -> Problem {
+    static METHODS: LazyLock<HashMap<String, String>> = LazyLock::new(|| {
+        let paths = Interface::openapi().paths.paths.into_iter();
+        paths.map(|(path, item)| (path, methods(&item))).collect()
+    });
+    let accepted = METHODS.get(path.as_str()).map_or("GET, HEAD", String::as_str);
+    let detail = format!("{} does not take {method}.", path.as_str());
+    Problem::new(Kind::MethodNotAllowed, detail).accepting(accepted)
+}
+
+fn methods(item: &PathItem) -> String {
+    let known = [(&item.get, "GET, HEAD"), (&item.post, "POST"), (&item.delete, "DELETE")];
+    known.iter().filter(|(operation, _)| operation.is_some()).map(|(_, name)| *name).collect::<Vec<_>>().join(", ")
 }
 
 /// `/openapi.json`

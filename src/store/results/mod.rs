@@ -17,6 +17,7 @@ use futures::future::{BoxFuture, Shared};
 use moka::future::Cache;
 use moka::policy::EvictionPolicy;
 use tokio::sync::oneshot;
+use tokio::task::spawn_blocking;
 
 use self::disk::ResultFolder;
 use super::StoreError;
@@ -127,7 +128,9 @@ impl<E: Clone + Send + Sync + 'static> ResultCache<E> {
             }
             match compute().await {
                 Ok(bytes) => {
-                    let result = CachedResult { hash: Hash::of(&bytes), bytes };
+                    // Hashing takes a millisecond or two a megabyte: not on a thread that others wait for.
+                    let hashed = spawn_blocking(move || CachedResult { hash: Hash::of(&bytes), bytes });
+                    let Ok(result) = hashed.await else { return };
                     memory.insert(key, result.clone()).await;
                     let _ = sender.send(Ok(result.clone()));
                     disk.write(key, result).await;

@@ -1,0 +1,197 @@
+//! Flakes baked into textures, so that ordinary viewers glitter: F0 and normal of every texel of the random tile.
+//!
+//! The F0 texture varies the fitted lobe as the flakes vary the paint at 25° off the gloss: brighter flakes are brighter
+//! facets. The normal texture tilts every cell a little, so that facets light up one after the other as the object turns.
+//! The F0 averages to the fitted one exactly, bytes and clamps included; the tilts widen the lobe by a few percent, which
+//! the loss report states. What a viewer shows is a likeness: the statistics themselves travel beside it.
+
+use image::ExtendedColorType;
+
+use super::ExportError;
+use super::gltf_brdf::GltfMaterial;
+use super::png_file::png;
+use crate::color::LinearRgb;
+use crate::paint::{Chi, Direction, FlakeSampler, Flakes, RandomTexture, Reflectance, TexelDraw, instrument_pairs};
+
+/// Largest F0 of a texel: beyond it a mirror does not go.
+const BRIGHTEST: f64 = 0.98;
+/// Least brightness of a texel, relative to the mean: measured flakes are noise around zero between glints.
+const DARKEST: f64 = 0.02;
+/// Standard deviation of the facets' slopes, as a share of the lobe's α.
+const TILT_SHARE: f64 = 0.3;
+/// Largest standard deviation of the slopes.
+const TILT_MAX: f64 = 0.1;
+/// The geometry whose flakes are baked: 25° off the gloss, where metallics glitter most to the eye.
+const BAKED_GEOMETRY: usize = 2;
+
+/// Baked textures of a paint.
+pub(super) struct Baked {
+    /// PNG of F0, sRGB.
+    pub f0: Vec<u8>,
+    /// Factor per channel that makes the texture's mean the fitted F0.
+    pub f0_factor: LinearRgb,
+    /// PNG of tangent-space normals.
+    pub normals: Vec<u8>,
+    /// Some of the normals, for the loss.
+    pub normal_sample: Vec<Direction>,
+}
+
+/// Color and tilt of one cell.
+#[derive(Clone, Copy)]
+struct Facet {
+    f0: [f32; 3],
+    normal: [f32; 3],
+}
+
+/// Bakes the flakes of a paint into the lobe of its fitted material, whose F0 is `f0`.
+pub(super) fn bake(
+    reflectance: &Reflectance<'_>,
+    flakes: &Flakes,
+    material: &GltfMaterial,
+    f0: LinearRgb,
+) -> Result<Baked, ExportError> {
+    let tile = RandomTexture::of(&flakes.texture);
+    let cells = tile.cells();
+    let width = tile.width() as usize;
+    let facet = facets(reflectance, flakes, material, f0);
+    let mut all: Vec<Facet> = Vec::with_capacity(cells.len());
+    for (k, &cell) in cells.iter().enumerate() {
+        // Cells are wider than texels: most repeat the texel beside or above.
+        let beside = (k % width > 0).then(|| k - 1);
+        let known = [beside, k.checked_sub(width)].into_iter().flatten().find(|&at| cells[at] == cell);
+        all.push(known.map_or_else(|| facet(cell), |at| all[at]));
+    }
+    let peak = all.iter().flat_map(|f| f.f0).fold(1e-6_f32, f32::max);
+    let curve = SrgbCurve::new();
+    let mut pixels = Vec::with_capacity(3 * all.len());
+    let mut sum = [0.0; 3];
+    for f in &all {
+        for k in 0..3 {
+            let byte = curve.byte(f.f0[k] / peak);
+            sum[k] += f64::from(curve.light[usize::from(byte)]);
+            pixels.push(byte);
+        }
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0..=255
+    let normals: Vec<u8> = all.iter().flat_map(|f| f.normal.map(|v| (127.5 + 127.5 * v).round() as u8)).collect();
+    #[allow(clippy::cast_precision_loss)] // a tile's texels
+    let mean = sum.map(|s| s / all.len() as f64);
+    let sample = all.iter().step_by(all.len().div_ceil(64).max(1)).map(|f| f.normal.map(f64::from)).collect();
+    let height = tile.height() as usize;
+    Ok(Baked {
+        f0: png(width, height, &pixels, ExtendedColorType::Rgb8)?,
+        f0_factor: std::array::from_fn(|k| if mean[k] > 1e-9 { f0[k] / mean[k] } else { 0.0 }),
+        normals: png(width, height, &normals, ExtendedColorType::Rgb8)?,
+        normal_sample: sample,
+    })
+}
+
+/// What a cell becomes.
+fn facets<'a>(
+    reflectance: &'a Reflectance<'_>,
+    flakes: &'a Flakes,
+    material: &GltfMaterial,
+    f0: LinearRgb,
+) -> impl Fn(u32) -> Facet + 'a {
+    let (wi, wo) = instrument_pairs()[BAKED_GEOMETRY];
+    let terms = reflectance.terms(wi, wo, Chi::Table);
+    let half = terms.map_or([0.0; 2], |t| [t.half.theta_h.to_degrees(), t.half.theta_d.to_degrees()]);
+    // On the nearest slice itself a draw is one draw, not a mixture of four.
+    let nearest = |grid: &crate::paint::AngleGrid, angle: f64| {
+        let bracket = grid.bracket(angle);
+        let index = if bracket.fraction < 0.5 { bracket.low } else { bracket.high };
+        #[allow(clippy::cast_possible_truncation)] // angles at texel precision
+        let angle = grid.degrees()[index] as f32;
+        (index, angle)
+    };
+    let (row, theta_h) = nearest(&flakes.theta_h, half[0]);
+    let (column, theta_d) = nearest(&flakes.theta_d, half[1]);
+    let mean = flakes.slice(row, column).mean();
+    let transmission = terms.map_or(1.0, |t| t.transmission);
+    // The lobe alone, without diffuse and coat.
+    let lobe = GltfMaterial { base_color: [0.0; 3], clearcoat: 0.0, ..*material }.evaluate(wi, wo);
+    let gain: [f64; 3] = lobe.map(|s| transmission / s.max(1e-5));
+    let sampler = FlakeSampler::new(flakes);
+    let slope = (TILT_SHARE * material.roughness.powi(2)).min(TILT_MAX);
+    move |cell| {
+        let color = sampler.color(cell, theta_h, theta_d);
+        #[allow(clippy::cast_possible_truncation)] // texel precision
+        let f0 = std::array::from_fn(|k| {
+            let relative = (1.0 + gain[k] * (f64::from(color[k]) - mean[k])).max(DARKEST);
+            (f0[k] * relative).min(BRIGHTEST) as f32
+        });
+        Facet { f0, normal: tilted(cell, slope) }
+    }
+}
+
+/// Normal of a cell: Gaussian slopes by Box and Muller from the cell's own random numbers.
+fn tilted(cell: u32, slope: f64) -> [f32; 3] {
+    let draw = TexelDraw::of(!cell, 0.0, 0.0, [1e4; 2]);
+    // Not the pick: it follows from the cell's number, and the brightest flakes would be the most tilted.
+    let radius = slope * (-2.0 * f64::from(draw.place[1]).ln()).sqrt();
+    let turn = std::f64::consts::TAU * f64::from(draw.place[0]);
+    let (x, y) = (radius * turn.cos(), radius * turn.sin());
+    let length = (1.0 + x * x + y * y).sqrt();
+    #[allow(clippy::cast_possible_truncation)] // becomes a byte
+    [x, y, 1.0].map(|v| (v / length) as f32)
+}
+
+/// The sRGB transfer curve by table, both ways (IEC 61966-2-1).
+struct SrgbCurve {
+    /// Byte of the square of `index/4095`.
+    bytes: Vec<u8>,
+    /// Light of every byte.
+    light: [f32; 256],
+}
+
+impl SrgbCurve {
+    fn new() -> Self {
+        let encode = |v: f64| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+        let decode = |s: f64| if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within 0..=255
+        let bytes = (0..4096_u32).map(|k| (255.0 * encode((f64::from(k) / 4095.0).powi(2))).round() as u8).collect();
+        #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // 0..=255
+        let light = std::array::from_fn(|k| decode(k as f64 / 255.0) as f32);
+        Self { bytes, light }
+    }
+
+    fn byte(&self, light: f32) -> u8 {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within 0..=4095
+        let index = (light.clamp(0.0, 1.0).sqrt() * 4095.0 + 0.5) as usize;
+        self.bytes[index]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::gltf_brdf::dielectric_f0;
+    use crate::export::gltf_fit::fit;
+    use crate::export::made_up::metallic;
+
+    #[test]
+    fn the_texture_averages_to_the_fitted_f0() {
+        let paint = metallic(8, 6, 30);
+        let reflectance = Reflectance::new(&paint);
+        let (material, _) = fit(&reflectance);
+        let f0 = dielectric_f0(material.ior, material.specular_color);
+        let baked = bake(&reflectance, paint.flakes.as_ref().expect("flakes"), &material, f0).expect("baked");
+        let picture = image::load_from_memory(&baked.f0).expect("a PNG").to_rgb8();
+        let curve = SrgbCurve::new();
+        for k in 0..3 {
+            let sum: f64 = picture.pixels().map(|p| f64::from(curve.light[usize::from(p.0[k])])).sum();
+            let mean = sum / f64::from(picture.width() * picture.height());
+            assert!((mean * baked.f0_factor[k] / f0[k] - 1.0).abs() < 1e-9);
+        }
+        let bytes: std::collections::BTreeSet<u8> = picture.pixels().map(|p| p.0[1]).collect();
+        assert!(bytes.len() > 10, "the texture varies");
+    }
+
+    #[test]
+    fn every_byte_of_the_curve_survives_both_ways() {
+        let curve = SrgbCurve::new();
+        for byte in 0..=255_u8 {
+            assert_eq!(curve.byte(curve.light[usize::from(byte)]), byte);
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! A service on a port of its own, with works that are quick, countable, and can be told to be slow or to break.
+
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
+use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
+use carpaint::service::{
+    Accuracy, App, Fault, Format, IngestOrder, PictureFormat, Progress, ServiceConfig, Thing, View, WorkError, Works,
+    open, serve,
+};
+use serde_json::{Value, json};
+use tokio::net::TcpListener;
+use tokio::sync::oneshot;
+use tokio::task::JoinHandle;
+
+use crate::client::{Answer, ask};
+
+/// Works that do what the upload says: `silver …` and such become a paint; `slow`, `panic` and `broken` do as told.
+#[derive(Debug)]
+pub struct Pretend;
+
+fn refuse(fault: Fault, message: impl Into<String>) -> WorkError {
+    WorkError { fault, field: None, message: message.into() }
+}
+
+impl Works for Pretend {
+    fn ingest(&self, upload: &Path, order: &IngestOrder, progress: Progress<'_>) -> Result<PaintFile, WorkError> {
+        let bytes = std::fs::read(upload).map_err(|error| refuse(Fault::Internal, error.to_string()))?;
+        let words = String::from_utf8_lossy(&bytes);
+        if words.starts_with("not") {
+            return Err(refuse(Fault::Upload, format!("{}: this is no measurement", upload.display())));
+        }
+        assert!(!words.starts_with("panic"), "told to");
+        if words.starts_with("slow") {
+            let begun = Instant::now();
+            while begun.elapsed() < Duration::from_secs(4) {
+                progress(begun.elapsed().as_secs_f32() / 4.0);
+                std::thread::sleep(Duration::from_millis(5));
+            }
+        }
+        let seed = f64::from(blake3::hash(&bytes).as_bytes()[0]) / 256.0;
+        let lobes = vec![Lobe { weight: [0.1; 3], alpha: 0.1 + seed, f0: 0.5 }];
+        let paint =
+            CarPaint { coat: None, diffuse: [seed, 0.2, 0.3], lobes, color_table: ColorTable::white(), flakes: None };
+        Ok(PaintFile {
+            name: order.name.clone().unwrap_or_else(|| "unnamed".to_owned()),
+            provenance: Provenance { source: "package".to_owned(), ..Provenance::default() },
+            energy: certify(&paint),
+            paint,
+            clustering: None,
+            residuals: None,
+            warnings: Vec::new(),
+        })
+    }
+
+    fn blend(&self, paints: &[&PaintFile], _: Accuracy, progress: Progress<'_>) -> Result<Blend, WorkError> {
+        std::thread::sleep(Duration::from_millis(100));
+        let ingredients: Vec<Ingredient<'_>> =
+            paints.iter().map(|file| Ingredient { name: &file.name, paint: &file.paint }).collect();
+        Blend::new(&ingredients, &BlendSettings::default(), progress).map_err(|e| refuse(Fault::Request, e.to_string()))
+    }
+
+    fn realise(
+        &self,
+        thing: &Thing,
+        weights: Option<&RealisationWeights>,
+        format: Format,
+        _: Accuracy,
+    ) -> Result<Vec<u8>, WorkError> {
+        std::thread::sleep(Duration::from_millis(50));
+        let diffuse = match thing {
+            Thing::Paint(file) => file.paint.diffuse,
+            Thing::Blend(blend) => {
+                let weights = weights.expect("a blend has weights");
+                assert!(weights.flake_saturation != 666.0, "told to");
+                blend.realise(weights).map_err(|e| refuse(Fault::Request, e.to_string()))?.paint.diffuse
+            }
+        };
+        Ok(format!("{format:?} {diffuse:?}").into_bytes())
+    }
+
+    fn preview(
+        &self,
+        thing: &Thing,
+        weights: Option<&RealisationWeights>,
+        view: &View,
+        format: PictureFormat,
+    ) -> Result<Vec<u8>, WorkError> {
+        let paint = self.realise(thing, weights, Format::Json, Accuracy::default())?;
+        Ok([format!("{format:?} {view:?} ").into_bytes(), paint].concat())
+    }
+
+    fn describe(&self, thing: &Thing) -> Value {
+        match thing {
+            Thing::Paint(file) => json!({ "name": file.name, "hash": file.paint.content_hash().to_hex().to_string() }),
+            Thing::Blend(blend) => json!({ "paints": blend.ingredients().map(|(name, _)| name).collect::<Vec<_>>() }),
+        }
+    }
+}
+
+/// A running service.
+pub struct House {
+    pub address: SocketAddr,
+    stop: Option<oneshot::Sender<()>>,
+    served: JoinHandle<()>,
+}
+
+impl House {
+    pub async fn open(data: &Path) -> Self {
+        Self::with(ServiceConfig::new(data.to_owned())).await
+    }
+
+    pub async fn with(config: ServiceConfig) -> Self {
+        let app: App = open(config, Arc::new(Pretend)).await.expect("opens");
+        app.set_ready();
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let address = listener.local_addr().expect("an address");
+        let (stop, stopped) = oneshot::channel();
+        let served = tokio::spawn(serve(app, listener, async {
+            let _ = stopped.await;
+        }));
+        Self { address, stop: Some(stop), served }
+    }
+
+    /// Ends the service as SIGTERM does.
+    pub async fn close(mut self) {
+        if let Some(stop) = self.stop.take() {
+            let _ = stop.send(());
+        }
+        self.served.await.expect("ends");
+    }
+
+    pub async fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]) -> Answer {
+        ask(self.address, method, path, headers, body).await
+    }
+
+    pub async fn get(&self, path: &str) -> Answer {
+        self.ask("GET", path, &[], b"").await
+    }
+
+    /// Uploads something and gives its id.
+    pub async fn paint(&self, words: &str) -> String {
+        let answer = self.ask("POST", "/v1/paints?name=some", &[("Prefer", "wait=60")], words.as_bytes()).await;
+        assert!([200, 201].contains(&answer.status), "{answer:?}");
+        answer.json()["id"].as_str().expect("an id").to_owned()
+    }
+
+    /// Blends paints and gives the blend's id.
+    pub async fn blend(&self, paints: &[&str]) -> String {
+        let body = json!({ "paints": paints }).to_string();
+        let answer = self.post_json("/v1/blends", &body).await;
+        assert!([200, 201].contains(&answer.status), "{answer:?}");
+        answer.json()["id"].as_str().expect("an id").to_owned()
+    }
+
+    pub async fn post_json(&self, path: &str, body: &str) -> Answer {
+        let headers = [("Content-Type", "application/json"), ("Prefer", "wait=60")];
+        self.ask("POST", path, &headers, body.as_bytes()).await
+    }
+
+    pub async fn count(&self, name: &str) -> f64 {
+        let text = self.get("/metrics").await.text();
+        let line = text.lines().find(|line| line.starts_with(&format!("{name} ")));
+        line.and_then(|line| line.split(' ').nth(1))
+            .and_then(|n| n.parse().ok())
+            .unwrap_or_else(|| panic!("{name}: {text}"))
+    }
+}
