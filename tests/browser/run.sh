@@ -12,4 +12,8 @@ if [ -z "${CHROMIUM:-}" ] && ! command -v chromium >/dev/null && ! command -v ch
   { apt-get update -qq && apt-get install -y -qq chromium; } >/dev/null
 fi
 [ -d node_modules/playwright-core ] && [ node_modules -nt package-lock.json ] || npm ci --no-audit --no-fund --silent
+
+export CARPAINT_FIXTURES="${CARPAINT_FIXTURES:-$PWD/../../target/browser-fixtures}"
+mkdir -p "$CARPAINT_FIXTURES"
+cargo run --quiet --example export_fixture -- "$CARPAINT_FIXTURES"
 node --test --test-timeout=300000
