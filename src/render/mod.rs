@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn a_solid_color_does_not_sparkle_and_a_metallic_does() {
-        let scene = Scene { object_mm: 8.0, ..scene(96, 64) };
+        let scene = Scene { object_mm: 8.0, ..scene(96, 128) };
         let calm = texture_of(&film(&solid(0.8, Some(Coat::smooth(1.5))), &scene), 20);
         let lively = texture_of(&film(&sparkling(), &scene), 20);
         assert!(calm < 0.012, "{calm}");
