@@ -235,6 +235,20 @@ mod tests {
         }
     }
 
+    /// `KHR_materials_specular`: one weight for all channels of the base, or its complement would show. Here the Khronos
+    /// renderer weighs by channel, so the number is worked from the extension's formula.
+    #[test]
+    fn a_colored_fresnel_term_takes_its_largest_channel_from_the_base() {
+        let material =
+            GltfMaterial { base_color: [0.5; 3], specular_color: [12.5, 0.0, 0.0], ..GltfMaterial::default() };
+        let f = material.evaluate([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
+        // α = 1: D = V = 1/π and 1/4; F0 = 0.04 · 12.5 = 0.5 in red.
+        let (diffuse, lobe) = (0.5 / PI, 0.25 / PI);
+        for (got, want) in f.iter().zip([0.5 * diffuse + 0.5 * lobe, 0.5 * diffuse, 0.5 * diffuse]) {
+            assert!((got - want).abs() < 1e-12, "{f:?}");
+        }
+    }
+
     proptest! {
         #[test]
         fn it_is_finite_and_not_negative(

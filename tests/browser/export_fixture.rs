@@ -1,7 +1,7 @@
 //! Writes bundles, GLBs and what they must shade to: the input of the browser tests.
 //!
 //! `cargo run --example export_fixture -- DIR`. The paints are made up: a silver under a coat with skewed, colored flakes
-//! that show every branch of the shader, and a solid without coat.
+//! that show every branch of the shader, the same with a hue that travels, and a solid without coat.
 
 use std::path::Path;
 
@@ -19,7 +19,7 @@ fn main() -> Result<(), Anything> {
     let folder = std::env::args().nth(1).ok_or("name a folder to write to")?;
     let folder = Path::new(&folder);
     std::fs::create_dir_all(folder)?;
-    for (name, paint) in [("silver", silver()?), ("solid", solid()?)] {
+    for (name, paint) in [("silver", silver()?), ("travel", travelling()?), ("solid", solid()?)] {
         let about = About {
             name: name.into(),
             provenance: Provenance { source: "made up".into(), ..Provenance::default() },
@@ -146,6 +146,25 @@ fn silver() -> Result<CarPaint, Anything> {
         color_table,
         flakes: Some(flakes),
     })
+}
+
+/// The silver, its flakes turning from green to violet with the half angle.
+fn travelling() -> Result<CarPaint, Anything> {
+    let mut paint = silver()?;
+    let flakes = paint.flakes.as_mut().ok_or("the silver has flakes")?;
+    for slice in 0..flakes.slices() {
+        #[allow(clippy::cast_precision_loss)]
+        let turn = 2.4 + 0.45 * (slice / flakes.theta_d.len()) as f64;
+        #[allow(clippy::cast_possible_truncation)]
+        let tint = [35.0 * turn.cos(), 35.0 * turn.sin()].map(|v| v as f32);
+        for k in flakes.offsets[slice] as usize..flakes.offsets[slice + 1] as usize {
+            for corner in [&mut flakes.lower[k], &mut flakes.upper[k]] {
+                corner[1] += tint[0];
+                corner[2] += tint[1];
+            }
+        }
+    }
+    checked(paint)
 }
 
 fn checked(paint: CarPaint) -> Result<CarPaint, Anything> {

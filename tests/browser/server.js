@@ -12,11 +12,12 @@ export const fixtures = process.env.CARPAINT_FIXTURES ?? join(here, "fixtures");
 
 const kinds = { ".html": "text/html", ".js": "text/javascript", ".json": "application/json" };
 
-// /fixtures/F, /page/F, /three/F, and /bundle/NAME/F: a file as it stands inside NAME.zip.
+// /fixtures/F, /page/F, /three/F (of the npm package), and /bundle/NAME/F: a file as it stands inside NAME.zip.
 async function find(path) {
   const [, place, ...rest] = normalize(path).split("/");
   if (place === "fixtures") return readFile(join(fixtures, ...rest));
   if (place === "page") return readFile(join(here, "page", ...rest));
+  if (place === "three") return readFile(join(here, "node_modules", "three", ...rest));
   if (place !== "bundle") throw new Error(`nothing at ${path}`);
   const [name, file] = rest;
   if (/^three\..*\.js$/.test(file)) return readFile(join(here, "node_modules", "three", "build", file));
