@@ -454,7 +454,7 @@ mod tests {
             }
             fit(&Reflectance::new(&paint))
         };
-        let (still, _) = travelling(0.0);
+        let (still, _) = fit(&Reflectance::new(&metallic(8, 6, 20)));
         assert_eq!(still.iridescence, 0.0);
         let (material, loss) = travelling(2.5);
         assert!(material.iridescence == 0.0 || loss.median < 12.0, "{loss:?}");

@@ -194,9 +194,14 @@ impl Header {
         let (Some(w), Some(h), true) = (side(width), side(height), area <= limits.pixels) else {
             return Err(PictureError::TooLarge { width, height, accepted: limits.pixels });
         };
+        let compression = compression.ok_or(PictureError::Header("it names no compression"))?;
+        // exr 1.74 allocates whatever a damaged DWA block claims, terabytes included, before it looks at the data.
+        if matches!(compression, 8 | 9) {
+            return Err(PictureError::Header("DWA compression is not read; store the picture with ZIP or PIZ"));
+        }
         Ok(Self {
             channels,
-            compression: compression.ok_or(PictureError::Header("it names no compression"))?,
+            compression,
             tiled: flags & 0x200 != 0,
             rows_from: y0,
             width: w,
