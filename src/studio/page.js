@@ -95,7 +95,7 @@ async function blend() {
     body: JSON.stringify({ paints: state.ids }),
   });
   state.blend = (await whenDone(answer)).id;
-  draw(true);
+  draw(false);
 }
 
 async function begin() {
