@@ -4,43 +4,25 @@
 //! of 4096 texels get small clusters of their own: 1, 1 and 1, then the 3 around the 99.9th percentile, where sparkle is
 //! judged, then 2, 2, 4 and 8, in proportion for other sizes. Where the cluster around the percentile holds few texels it
 //! is the color of its middle one: a step of the histogram there would make the percentile of any finite drawing jump.
-//! What that takes from the mean the brighter ones give back. The rest is split where the squared distance from the clusters' means is largest: at the mean of the axis that spreads most, or,
-//! along lightness, where the split lowers the sum of squares most. A leaf's box then follows one of two rules:
+//! What that takes from the mean the brighter ones give back. The rest is split where the squared distance from the
+//! clusters' means is largest: at the mean of the axis that spreads most, or, along lightness, where the split lowers the
+//! sum of squares most. A leaf's box then follows one of two rules:
 //!
 //! - [`BoxRule::Moments`]: mean ± √3 σ on each axis, the uniform box of the members' variance, shifted so that its mean
-//!   in *linear light* is its members' ([`center_of_mean`]). Light adds in linear RGB: the slice's mean is kept exactly,
-//!   to the rounding of `f32` corners. Boxes reach beyond their members; negative light from sensor noise is kept.
+//!   in *linear light* is its members' ([`center_of_mean`](crate::paint::center_of_mean)). Light adds in linear RGB: the
+//!   slice's mean is kept exactly, to the rounding of `f32` corners. Boxes reach beyond their members; negative light
+//!   from sensor noise is kept.
 //! - [`BoxRule::Tight`]: the members' bounding box (Golla and Klein 2018, fig. 2c). Keeps the sparkle, misses the mean.
 //!
 //! Pixels that are not finite are left out, and so counted; colors beyond |Lab| = 2000 are held there, and so counted.
 //! Clusters ascend in the lightness of their centers. Equal boxes are one cluster.
 
+use std::cmp::Ordering;
+
 use serde::{Deserialize, Serialize};
 
-use crate::color::{D65_2, KNEE, Lab, LinearRgb, rgb_to_xyz};
-use crate::paint::{MAX_LAB, center_of_mean};
-
-/// How a cluster's box follows from its members.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum BoxRule {
-    /// The bounding box.
-    Tight,
-    /// Mean and variance, and the exact mean in linear light.
-    #[default]
-    Moments,
-}
-
-impl BoxRule {
-    /// Name as it stands in files and profiles.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Tight => "tight",
-            Self::Moments => "moments",
-        }
-    }
-}
+use super::boxes::{BoxRule, moments, tight};
+use super::texels::{Texel, linear, take_in};
 
 /// How a slice is clustered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -88,81 +70,19 @@ const BRIGHT_SHARE: usize = 5;
 const BELOW_SPARKLE: [usize; 4] = [2, 2, 4, 8];
 /// Largest cluster that the sparkle is a single color in.
 const FLAT: usize = 8;
+/// Brightest texels up to which a list of them beats partial sorting.
+const LISTED: usize = 64;
 /// Buckets of lightness that the crowd is sorted into.
 const BUCKETS: usize = 256;
-
-/// A texel: L, a, b, and its number disguised as a small normal float, so that four lanes add at once.
-type Texel = [f32; 4];
-
-fn disguised(number: u32) -> f32 {
-    f32::from_bits(0x3000_0000 + number)
-}
-
-fn number(texel: &Texel) -> usize {
-    (texel[3].to_bits() - 0x3000_0000) as usize
-}
-
-/// Texels that are converted at once.
-const LANES: usize = 64;
-
-/// Lab of π f for up to 64 texels, in `f32`; whether all of them are finite and within the bounds.
-///
-/// Good to 2e-6 of f, a hundredth of what the half floats of a slice resolve. For the assignment of texels to
-/// clusters; [`Lab::from_rgb`] is the exact one.
-fn lab_of(rgb: [&[f32]; 3], out: &mut [[f32; LANES]; 3]) -> bool {
-    const M: [[f32; 3]; 3] = pi_xyz_over_white();
-    let bound = MAX_LAB as f32;
-    let n = rgb[0].len().min(LANES);
-    let (r, g, b) = (&rgb[0][..n], &rgb[1][..n], &rgb[2][..n]);
-    let [light, green_red, yellow_blue] = out;
-    let mut outside = 0_u32;
-    for k in 0..n {
-        let f = M.map(|m| compress(m[0] * r[k] + m[1] * g[k] + m[2] * b[k]));
-        let lab = [116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])];
-        let inside = (lab[0].abs() <= bound) & (lab[1].abs() <= bound) & (lab[2].abs() <= bound);
-        outside |= u32::from(!inside);
-        (light[k], green_red[k], yellow_blue[k]) = (lab[0], lab[1], lab[2]);
-    }
-    outside == 0
-}
-
-/// The matrix from linear sRGB in 1/sr to XYZ of π f over white.
-const fn pi_xyz_over_white() -> [[f32; 3]; 3] {
-    let white = [D65_2.x, D65_2.y, D65_2.z];
-    let columns = [rgb_to_xyz([1.0, 0.0, 0.0]), rgb_to_xyz([0.0, 1.0, 0.0]), rgb_to_xyz([0.0, 0.0, 1.0])];
-    let mut m = [[0.0; 3]; 3];
-    let mut k = 0;
-    while k < 9 {
-        let (row, column) = (k / 3, k % 3);
-        m[row][column] = (std::f64::consts::PI * columns[column][row] / white[row]) as f32;
-        k += 1;
-    }
-    m
-}
-
-/// The CIELAB compression in `f32`: a cube root by Halley's method from a guess by the exponent.
-#[inline(always)]
-fn compress(t: f32) -> f32 {
-    const KNEE_LIGHT: f32 = (KNEE * KNEE * KNEE) as f32;
-    const SLOPE: f32 = (1.0 / (3.0 * KNEE * KNEE)) as f32;
-    let x = t.max(KNEE_LIGHT);
-    // A third of the exponent, by shifts that vectorise: 1/4 + 1/16 + ... (Warren, Hacker's Delight, 11-2).
-    let mut third = (x.to_bits() >> 2) + (x.to_bits() >> 4);
-    third += third >> 4;
-    third += third >> 8;
-    let mut y = f32::from_bits(third + 0x2a51_37a0);
-    for _ in 0..2 {
-        let cube = y * y * y;
-        y *= (cube + 2.0 * x) / (2.0 * cube + x);
-    }
-    if t > KNEE_LIGHT { y } else { t * SLOPE + (4.0 / 29.0) as f32 }
-}
 
 /// Room for clustering, kept from slice to slice.
 #[derive(Debug, Default)]
 pub struct Clusterer {
     texels: Vec<Texel>,
+    /// The picture's numbers, pixel by pixel.
+    light: Vec<[f32; 4]>,
     sorted: Vec<Texel>,
+    bucket: Vec<u8>,
     leaves: Vec<Node>,
     /// Texels that are not among the brightest.
     crowd: usize,
@@ -195,6 +115,16 @@ impl Sums {
             self.first[k] += other.first[k];
             self.second[k] += other.second[k];
         }
+    }
+
+    /// The sums over the texels that `part` leaves. Rounding matters little: they only choose where to split.
+    fn without(mut self, part: &Self) -> Self {
+        self.count -= part.count;
+        for k in 0..4 {
+            self.first[k] -= part.first[k];
+            self.second[k] -= part.second[k];
+        }
+        self
     }
 
     /// Squared distances from the mean, per axis.
@@ -233,7 +163,7 @@ impl Clusterer {
     /// [`NoTexel`] when no pixel is finite.
     pub fn cluster(&mut self, planes: [&[f32]; 3], settings: &ClusterSettings) -> Result<SliceClusters, NoTexel> {
         let pixels = planes[0].len();
-        let (dead, beyond) = self.take_in(planes);
+        let (dead, beyond) = take_in(planes, &mut self.texels, &mut self.light);
         if self.texels.is_empty() {
             return Err(NoTexel { pixels });
         }
@@ -241,45 +171,9 @@ impl Clusterer {
         self.leaves.clear();
         self.crowd = self.take_brightest(most);
         self.split_crowd(self.crowd, most - self.leaves.len());
-        let mut clusters = self.boxes(planes, settings.box_rule);
+        let mut clusters = self.boxes(settings.box_rule);
         (clusters.dead, clusters.beyond) = (dead, beyond);
         Ok(clusters)
-    }
-
-    /// Fills `texels` with the finite pixels; returns how many were not, and how many lay beyond the bounds.
-    fn take_in(&mut self, planes: [&[f32]; 3]) -> (usize, usize) {
-        let [red, green, blue] = planes;
-        self.texels.clear();
-        self.texels.resize(red.len(), [0.0; 4]);
-        let mut lab = [[0.0_f32; LANES]; 3];
-        let mut within = true;
-        let chunks = red.chunks(LANES).zip(green.chunks(LANES)).zip(blue.chunks(LANES));
-        for (((r, g), b), out) in chunks.zip(self.texels.chunks_mut(LANES)) {
-            within &= lab_of([r, g, b], &mut lab);
-            for (k, texel) in out.iter_mut().enumerate() {
-                *texel = [lab[0][k], lab[1][k], lab[2][k], 0.0];
-            }
-        }
-        for (number, texel) in (0_u32..).zip(&mut self.texels) {
-            texel[3] = disguised(number);
-        }
-        if within {
-            return (0, 0);
-        }
-        let bound = MAX_LAB as f32;
-        let finite = |t: &Texel| {
-            let k = number(t);
-            red[k].is_finite() && green[k].is_finite() && blue[k].is_finite()
-        };
-        self.texels.retain(finite);
-        let mut beyond = 0;
-        for texel in &mut self.texels {
-            // A finite color so bright that its own arithmetic overflowed is as far out as can be.
-            let held = [0, 1, 2].map(|k| if texel[k].is_nan() { 0.0 } else { texel[k].clamp(-bound, bound) });
-            beyond += usize::from(held != texel[..3]);
-            texel[..3].copy_from_slice(&held);
-        }
-        (red.len() - self.texels.len(), beyond)
     }
 
     /// Moves the brightest texels behind the others, a leaf for each group; returns how many the others are.
@@ -290,16 +184,46 @@ impl Clusterer {
         if taken == 0 || taken >= count {
             return count;
         }
-        let by_lightness = |x: &Texel, y: &Texel| x[0].total_cmp(&y[0]).then(x[3].total_cmp(&y[3]));
         let crowd = count - taken;
-        self.texels.select_nth_unstable_by(crowd, by_lightness);
-        self.texels[crowd..].sort_unstable_by(|x, y| by_lightness(y, x));
+        if taken <= LISTED {
+            self.list_brightest(crowd);
+        } else {
+            self.texels.select_nth_unstable_by(crowd, by_lightness);
+            self.texels[crowd..].sort_unstable_by(|x, y| by_lightness(y, x));
+        }
         let mut from = 0;
         for to in ends {
             self.leaves.push(Node::new(crowd + from, crowd + to, None, Sums::default()));
             from = to;
         }
         crowd
+    }
+
+    /// Moves all but `crowd` texels, the brightest, to the end, the brightest of them first: by a short list.
+    fn list_brightest(&mut self, crowd: usize) {
+        let taken = self.texels.len() - crowd;
+        let mut list: Vec<Texel> = Vec::with_capacity(taken + 1);
+        let mut least = f32::NEG_INFINITY;
+        for texel in &self.texels {
+            if texel[0] >= least {
+                let place = list.partition_point(|brighter| by_lightness(brighter, texel).is_gt());
+                list.insert(place, *texel);
+                list.truncate(taken);
+                if list.len() == taken {
+                    least = list[taken - 1][0];
+                }
+            }
+        }
+        let (last, mut end, mut k) = (list[taken - 1], self.texels.len(), 0);
+        while end > crowd {
+            if self.texels[k][0] >= least && by_lightness(&self.texels[k], &last).is_ge() {
+                end -= 1;
+                self.texels.swap(k, end);
+            } else {
+                k += 1;
+            }
+        }
+        self.texels[crowd..].copy_from_slice(&list);
     }
 
     /// Splits the first `crowd` texels into at most `most` leaves.
@@ -321,8 +245,12 @@ impl Clusterer {
             let halves = halves.or_else(|| {
                 let middle = node.from + partition(&mut self.texels[node.from..node.to], node.axis, mean);
                 (middle > node.from && middle < node.to).then(|| {
-                    [(node.from, middle), (middle, node.to)]
-                        .map(|(from, to)| Node::new(from, to, None, Sums::of(&self.texels[from..to], &origin)))
+                    let runs = [node.from..middle, middle..node.to];
+                    let fewer = usize::from(runs[1].len() < runs[0].len());
+                    let sums = Sums::of(&self.texels[runs[fewer].clone()], &origin);
+                    let others = node.sums.without(&sums);
+                    let sums = if fewer == 0 { [sums, others] } else { [others, sums] };
+                    [0, 1].map(|k| Node::new(runs[k].start, runs[k].end, None, sums[k]))
                 })
             });
             match halves {
@@ -338,20 +266,28 @@ impl Clusterer {
     /// Sorts the crowd by bucket of lightness; returns the origin of the sums, the buckets' starts and sums.
     fn sort_into_buckets(&mut self, crowd: usize) -> (Texel, Vec<usize>, Vec<Sums>) {
         let texels = &self.texels[..crowd];
-        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-        let mut mean = [0.0_f32; 4];
+        let (mut low, mut high) = (texels[0], texels[0]);
         for texel in texels {
-            (low, high) = (low.min(texel[0]), high.max(texel[0]));
             for k in 0..4 {
-                mean[k] += texel[k];
+                low[k] = if texel[k] < low[k] { texel[k] } else { low[k] };
+                high[k] = if texel[k] > high[k] { texel[k] } else { high[k] };
             }
         }
-        let origin = mean.map(|m| m / crowd.max(1) as f32);
-        let scale = if high > low { BUCKETS as f32 / (high - low) } else { 0.0 };
-        let bucket = |texel: &Texel| (((texel[0] - low) * scale) as usize).min(BUCKETS - 1);
+        // Sums about any point in the crowd keep their digits; a sample's mean is such a point.
+        let sample = texels.iter().step_by(16);
+        let share = 1.0 / sample.len() as f32;
+        let mut origin = [0.0; 4];
+        for texel in sample {
+            for k in 0..4 {
+                origin[k] += texel[k] * share;
+            }
+        }
+        let scale = if high[0] > low[0] { BUCKETS as f32 / (high[0] - low[0]) } else { 0.0 };
+        self.bucket.clear();
+        self.bucket.extend(texels.iter().map(|texel| (((texel[0] - low[0]) * scale) as usize).min(BUCKETS - 1) as u8));
         let mut starts = vec![0_usize; BUCKETS + 1];
-        for texel in texels {
-            starts[bucket(texel) + 1] += 1;
+        for &bucket in &self.bucket {
+            starts[usize::from(bucket) + 1] += 1;
         }
         for k in 0..BUCKETS {
             starts[k + 1] += starts[k];
@@ -359,8 +295,8 @@ impl Clusterer {
         let mut next = starts.clone();
         self.sorted.clear();
         self.sorted.resize(crowd, [0.0; 4]);
-        for texel in texels {
-            let place = &mut next[bucket(texel)];
+        for (texel, &bucket) in texels.iter().zip(&self.bucket) {
+            let place = &mut next[usize::from(bucket)];
             self.sorted[*place] = *texel;
             *place += 1;
         }
@@ -377,15 +313,15 @@ impl Clusterer {
     }
 
     /// The boxes of all leaves, lightest last.
-    fn boxes(&self, planes: [&[f32]; 3], rule: BoxRule) -> SliceClusters {
+    fn boxes(&self, rule: BoxRule) -> SliceClusters {
         let mut boxes: Vec<(usize, [f32; 3], [f32; 3])> = Vec::with_capacity(self.leaves.len());
-        let flat = self.flat_leaf();
+        let (flat, light) = (self.flat_leaf(), self.light.as_slice());
         let (mut owed, mut brighter) = ([0.0; 3], 0);
         if let Some(flat) = flat {
             let members = &self.texels[self.leaves[flat].from..self.leaves[flat].to];
-            let middle = linear(&members[members.len() / 2], planes);
+            let middle = linear(&members[members.len() / 2], light);
             for texel in members {
-                let own = linear(texel, planes);
+                let own = linear(texel, light);
                 (0..3).for_each(|k| owed[k] += own[k] - middle[k]);
             }
             brighter = self.leaves[flat].from - self.crowd;
@@ -395,12 +331,12 @@ impl Clusterer {
             let (lower, upper) = match rule {
                 BoxRule::Tight => tight(members),
                 BoxRule::Moments if Some(number) == flat && brighter > 0 => {
-                    moments(&members[members.len() / 2..][..1], planes, [0.0; 3])
+                    moments(&members[members.len() / 2..][..1], light, [0.0; 3])
                 }
                 BoxRule::Moments if flat.is_some_and(|flat| number < flat) => {
-                    moments(members, planes, owed.map(|o| o / brighter as f64))
+                    moments(members, light, owed.map(|o| o / brighter as f64))
                 }
-                BoxRule::Moments => moments(members, planes, [0.0; 3]),
+                BoxRule::Moments => moments(members, light, [0.0; 3]),
             };
             boxes.push((members.len(), lower, upper));
         }
@@ -409,7 +345,7 @@ impl Clusterer {
             let (cx, cy) = (center(x), center(y));
             let order = |a: &[f32; 3], b: &[f32; 3]| (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne());
             let order = order(&cx, &cy).or_else(|| order(&x.1, &y.1)).or_else(|| order(&x.2, &y.2));
-            order.unwrap_or(std::cmp::Ordering::Equal)
+            order.unwrap_or(Ordering::Equal)
         });
         boxes.dedup_by(|next, kept| {
             let same = (next.1, next.2) == (kept.1, kept.2);
@@ -425,6 +361,11 @@ impl Clusterer {
             beyond: 0,
         }
     }
+}
+
+/// Order of lightness, of the place in the picture among equals.
+fn by_lightness(x: &Texel, y: &Texel) -> Ordering {
+    x[0].total_cmp(&y[0]).then(x[3].total_cmp(&y[3]))
 }
 
 /// Ends of the groups of the brightest of `count` texels, brightest first, in at most `groups` groups.
@@ -480,62 +421,250 @@ fn split_buckets(starts: &[usize], sums: &[Sums], low: usize, high: usize) -> Op
     best.1.map(|k| [bucketed(starts, sums, low, k), bucketed(starts, sums, k, high)])
 }
 
-/// Moves the texels below `pivot` on an axis to the front; returns how many they are. Without a branch to guess.
+/// Moves the texels below `pivot` on an axis to the front; returns how many they are.
+///
+/// Without a branch to guess, and with the comparison before the exchange: through memory it would wait for the stores.
+#[allow(clippy::manual_swap)]
 fn partition(texels: &mut [Texel], axis: usize, pivot: f32) -> usize {
     let mut below = 0;
     for k in 0..texels.len() {
-        texels.swap(k, below);
-        below += usize::from(texels[below][axis] < pivot);
+        let goes = usize::from(texels[k][axis] < pivot);
+        let texel = texels[k];
+        texels[k] = texels[below];
+        texels[below] = texel;
+        below += goes;
     }
     below
 }
 
-fn tight(members: &[Texel]) -> ([f32; 3], [f32; 3]) {
-    let (mut lower, mut upper) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    for texel in members {
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::{Lab, luminance};
+    use crate::paint::{MAX_LAB, Slice};
+    use std::f64::consts::PI;
+
+    fn cluster_by(pixels: &[[f32; 3]], settings: ClusterSettings) -> Result<SliceClusters, NoTexel> {
+        let plane = |k: usize| -> Vec<f32> { pixels.iter().map(|p| p[k]).collect() };
+        let (red, green, blue) = (plane(0), plane(1), plane(2));
+        Clusterer::default().cluster([&red, &green, &blue], &settings)
+    }
+
+    fn cluster(pixels: &[[f32; 3]]) -> SliceClusters {
+        let clusters = cluster_by(pixels, ClusterSettings::default()).expect("has texels");
+        let n = clusters.probability.len();
+        assert!(n >= 1 && n <= 50 && clusters.lower.len() == n && clusters.upper.len() == n);
+        let sum: f64 = clusters.probability.iter().sum();
+        assert!((sum - 1.0).abs() <= f64::EPSILON * n as f64, "{sum}");
+        for (lower, upper) in clusters.lower.iter().zip(&clusters.upper) {
+            for k in 0..3 {
+                assert!(lower[k] <= upper[k] && f64::from(lower[k].abs().max(upper[k].abs())) <= MAX_LAB);
+            }
+        }
+        clusters
+    }
+
+    fn slice(clusters: &SliceClusters) -> Slice<'_> {
+        Slice { probability: &clusters.probability, lower: &clusters.lower, upper: &clusters.upper }
+    }
+
+    /// Mean of the finite pixels, 1/sr.
+    fn mean_of(pixels: &[[f32; 3]]) -> [f64; 3] {
+        let finite: Vec<_> = pixels.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+        [0, 1, 2].map(|k| finite.iter().map(|p| f64::from(p[k])).sum::<f64>() / finite.len() as f64)
+    }
+
+    /// Corners round to `f32`: L, a, b to 2^-24 of themselves, light to three times that and the matrix' condition, 5.
+    fn assert_mean(clusters: &SliceClusters, pixels: &[[f32; 3]]) {
+        let (got, want) = (slice(clusters).mean(), mean_of(pixels));
+        let scale = pixels.iter().flatten().filter(|v| v.is_finite()).fold(0.0, |s, v| s + f64::from(v.abs()));
         for k in 0..3 {
-            (lower[k], upper[k]) = (lower[k].min(texel[k]), upper[k].max(texel[k]));
+            let tolerance = 2e-6 * (scale / pixels.len() as f64) + 1e-9;
+            assert!((got[k] - want[k]).abs() <= tolerance, "{got:?} instead of {want:?}");
         }
     }
-    (lower, upper)
-}
 
-/// The box of the members' mean and variance, and of their mean in linear light plus `more`.
-fn moments(members: &[Texel], planes: [&[f32]; 3], more: LinearRgb) -> ([f32; 3], [f32; 3]) {
-    let origin = members[0].map(f64::from);
-    let (mut first, mut second, mut light) = ([0.0_f64; 3], [0.0_f64; 3], [0.0_f64; 3]);
-    for texel in members {
-        for k in 0..3 {
-            let d = f64::from(texel[k]) - origin[k];
-            first[k] += d;
-            second[k] += d * d;
+    /// Numbers between 0 and 1, the same on every run.
+    fn noise(k: usize, salt: u64) -> f64 {
+        let mut h = (k as u64 ^ salt << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        h = (h ^ h >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93);
+        ((h ^ h >> 32) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// A slice as cameras see it: exponential brightness under sensor noise, two tints, one texel in thirty a flake.
+    fn sparkling(count: usize, salt: u64) -> Vec<[f32; 3]> {
+        let pixel = |k: usize| {
+            let lit = if noise(k, salt) < 0.03 { 2.0 } else { 0.01 };
+            let light = -lit * noise(k, salt + 1).ln();
+            let tint = if noise(k, salt + 2) < 0.5 { [1.0, 0.8, 0.4] } else { [0.3, 0.7, 1.0] };
+            [0, 1, 2].map(|c| (light * tint[c] + 3e-4 * (noise(k, salt + 3 + c as u64) - 0.5)) as f32)
+        };
+        (0..count).map(pixel).collect()
+    }
+
+    /// Luminances of stratified draws from the clusters, sorted.
+    fn drawn(clusters: &SliceClusters, count: usize) -> Vec<f64> {
+        let mut light = Vec::with_capacity(count);
+        let (mut k, mut sum) = (0, clusters.probability[0]);
+        for j in 0..count {
+            while (j as f64 + 0.5) / count as f64 > sum && k + 1 < clusters.probability.len() {
+                k += 1;
+                sum += clusters.probability[k];
+            }
+            let at = |axis: usize| {
+                let (low, high) = (f64::from(clusters.lower[k][axis]), f64::from(clusters.upper[k][axis]));
+                low + (high - low) * noise(j, 90 + axis as u64)
+            };
+            light.push(luminance(Lab { l: at(0), a: at(1), b: at(2) }.to_rgb()) / PI);
         }
-        let rgb = linear(texel, planes);
-        for k in 0..3 {
-            light[k] += rgb[k];
+        light.sort_by(f64::total_cmp);
+        light
+    }
+
+    fn percentile(sorted: &[f64], share: f64) -> f64 {
+        let place = share * (sorted.len() - 1) as f64;
+        let (low, part) = (place.floor() as usize, place.fract());
+        sorted[low] + part * (sorted[(low + 1).min(sorted.len() - 1)] - sorted[low])
+    }
+
+    #[test]
+    fn the_mean_is_exact_and_the_sparkle_is_kept() {
+        for (count, salt) in [(4096, 1), (4096, 20), (2304, 40), (9216, 60), (16384, 80)] {
+            let pixels = sparkling(count, salt);
+            let clusters = cluster(&pixels);
+            assert_mean(&clusters, &pixels);
+            let mut light: Vec<f64> = pixels.iter().map(|p| luminance(p.map(f64::from))).collect();
+            light.sort_by(f64::total_cmp);
+            let draws = drawn(&clusters, 300_000);
+            let sparkle = percentile(&draws, 0.999) / percentile(&light, 0.999);
+            assert!((sparkle - 1.0).abs() < 0.05, "{count}: 99.9th percentile off by {sparkle}");
+            let spread = |v: &[f64]| {
+                let mean = v.iter().sum::<f64>() / v.len() as f64;
+                (v.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / v.len() as f64).sqrt()
+            };
+            let spread = spread(&draws) / spread(&light);
+            assert!((spread - 1.0).abs() < 0.02, "{count}: standard deviation off by {spread}");
         }
     }
-    let count = members.len() as f64;
-    let mean: [f64; 3] = std::array::from_fn(|k| origin[k] + first[k] / count);
-    let half = std::array::from_fn(|k| {
-        let variance = (second[k] / count - (first[k] / count).powi(2)).max(0.0);
-        // A box must not reach beyond the bounds, wherever its mean moves it.
-        (3.0 * variance).sqrt().min((MAX_LAB - mean[k].abs()).max(0.0))
-    });
-    let light: LinearRgb = std::array::from_fn(|k| light[k] / count + more[k]);
-    let center = center_of_mean(half, light, mean);
-    let bound = MAX_LAB as f32;
-    let corner = |sign: f64| std::array::from_fn(|k| ((center[k] + sign * half[k]) as f32).clamp(-bound, bound));
-    (corner(-1.0), corner(1.0))
-}
 
-/// Linear reflectance factor of a texel: from the picture, or from its Lab where that was held at the bounds.
-fn linear(texel: &Texel, planes: [&[f32]; 3]) -> LinearRgb {
-    let k = number(texel);
-    let bound = MAX_LAB as f32;
-    if texel[0].abs() < bound && texel[1].abs() < bound && texel[2].abs() < bound {
-        planes.map(|plane| f64::from(plane[k]) * std::f64::consts::PI)
-    } else {
-        Lab::from([0, 1, 2].map(|c| f64::from(texel[c]))).to_rgb()
+    #[test]
+    fn the_variance_in_lab_is_kept() {
+        let pixels = sparkling(4096, 7);
+        let clusters = cluster(&pixels);
+        for axis in 0..3 {
+            let labs = pixels.iter().map(|p| Lab::from_rgb(p.map(|v| f64::from(v) * PI)).to_array()[axis]);
+            let labs: Vec<f64> = labs.collect();
+            let mean = labs.iter().sum::<f64>() / labs.len() as f64;
+            let want = labs.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / labs.len() as f64;
+            let moments = clusters.probability.iter().zip(clusters.lower.iter().zip(&clusters.upper));
+            let (mut first, mut second) = (0.0, 0.0);
+            for (p, (lower, upper)) in moments {
+                let (low, high) = (f64::from(lower[axis]), f64::from(upper[axis]));
+                first += p * f64::midpoint(low, high);
+                second += p * ((low * low + low * high + high * high) / 3.0);
+            }
+            // Boxes keep their members' variance; moving their middles to keep the mean of light changes a little.
+            let got = second - first * first;
+            assert!((got / want - 1.0).abs() < 0.02, "axis {axis}: {got} instead of {want}");
+        }
+    }
+
+    #[test]
+    fn one_color_is_one_cluster_and_two_are_two() {
+        let one = cluster(&[[0.2, 0.1, 0.05]; 4096]);
+        assert_eq!((one.probability.as_slice(), &one.lower), (&[1.0][..], &one.upper));
+        assert_mean(&one, &[[0.2, 0.1, 0.05]]);
+        let two: Vec<[f32; 3]> = (0..4096).map(|k| if k % 4 == 0 { [0.5; 3] } else { [0.1, 0.1, 0.3] }).collect();
+        let clusters = cluster(&two);
+        assert_eq!(clusters.probability, [0.75, 0.25]);
+        assert_mean(&clusters, &two);
+    }
+
+    #[test]
+    fn black_is_black_and_noise_around_it_keeps_its_mean() {
+        let black = cluster(&[[0.0; 3]; 4096]);
+        assert_eq!(black.probability, [1.0]);
+        assert!(slice(&black).mean().iter().all(|v| v.abs() < 1e-9));
+        let noise: Vec<[f32; 3]> = (0..4096).map(|k| [0, 1, 2].map(|c| (2e-4 * (noise(k, c) - 0.6)) as f32)).collect();
+        let clusters = cluster(&noise);
+        assert!(mean_of(&noise)[0] < 0.0);
+        assert_mean(&clusters, &noise);
+    }
+
+    #[test]
+    fn one_pixel_a_million_times_brighter_is_kept_or_held_and_told() {
+        let mut pixels = vec![[1e-4_f32, 2e-4, 1e-4]; 4096];
+        pixels[100] = [100.0, 200.0, 100.0];
+        let clusters = cluster(&pixels);
+        assert_eq!(clusters.beyond, 0);
+        assert_mean(&clusters, &pixels);
+        pixels[100] = [1e6; 3];
+        let clusters = cluster(&pixels);
+        assert_eq!(clusters.beyond, 1);
+        assert!(slice(&clusters).mean()[0] < 1.0);
+    }
+
+    #[test]
+    fn dead_pixels_are_left_out_and_a_dead_slice_is_refused() {
+        let mut pixels = sparkling(4096, 3);
+        for k in [0, 17, 2000, 4095] {
+            pixels[k][k % 3] = f32::NAN;
+        }
+        let clusters = cluster(&pixels);
+        assert_eq!(clusters.dead, 4);
+        assert_mean(&clusters, &pixels);
+        let dead = cluster_by(&[[f32::NAN; 3]; 9], ClusterSettings::default());
+        assert_eq!(dead, Err(NoTexel { pixels: 9 }));
+        assert_eq!(cluster_by(&[], ClusterSettings::default()), Err(NoTexel { pixels: 0 }));
+    }
+
+    #[test]
+    fn few_pixels_make_few_clusters() {
+        assert_eq!(cluster(&[[0.3; 3]]).probability, [1.0]);
+        let three = cluster(&[[0.3; 3], [0.1, 0.2, 0.3], [0.9, 0.1, 0.2]]);
+        assert_eq!(three.probability, [1.0 / 3.0; 3]);
+        for count in [2, 5, 60, 200, 700, 1100] {
+            let pixels = sparkling(count, 11);
+            assert_mean(&cluster(&pixels), &pixels);
+        }
+    }
+
+    #[test]
+    fn any_number_of_clusters_keeps_the_mean() {
+        let pixels = sparkling(4096, 5);
+        for clusters in [1, 2, 5, 14, 15, 25, 30, 39, 50, 100, 400, 4096] {
+            let settings = ClusterSettings { clusters, ..ClusterSettings::default() };
+            let found = cluster_by(&pixels, settings).expect("has texels");
+            assert!(found.probability.len() <= clusters, "{clusters}");
+            assert_mean(&found, &pixels);
+        }
+    }
+
+    #[test]
+    fn tight_boxes_hold_every_texel() {
+        let pixels = sparkling(1000, 9);
+        let settings = ClusterSettings { box_rule: BoxRule::Tight, ..ClusterSettings::default() };
+        let clusters = cluster_by(&pixels, settings).expect("has texels");
+        for pixel in &pixels {
+            let lab = Lab::from_rgb(pixel.map(|v| f64::from(v) * PI)).to_array();
+            let inside = |(lower, upper): (&[f32; 3], &[f32; 3])| {
+                (0..3).all(|k| (f64::from(lower[k]) - 1e-2..=f64::from(upper[k]) + 1e-2).contains(&lab[k]))
+            };
+            assert!(clusters.lower.iter().zip(&clusters.upper).any(inside), "{lab:?}");
+        }
+    }
+
+    #[test]
+    fn clusters_ascend_in_lightness_and_room_used_before_changes_nothing() {
+        let (first, second) = (sparkling(4096, 1), sparkling(2000, 2));
+        let mut room = Clusterer::default();
+        let planes = |p: &[[f32; 3]]| [0, 1, 2].map(|k| p.iter().map(|v| v[k]).collect::<Vec<f32>>());
+        let (a, b) = (planes(&first), planes(&second));
+        let settings = ClusterSettings::default();
+        let alone = room.cluster(b.each_ref().map(Vec::as_slice), &settings).expect("has texels");
+        room.cluster(a.each_ref().map(Vec::as_slice), &settings).expect("has texels");
+        assert_eq!(room.cluster(b.each_ref().map(Vec::as_slice), &settings), Ok(alone.clone()));
+        let light = |k: usize| alone.lower[k][0] + alone.upper[k][0];
+        assert!((1..alone.probability.len()).all(|k| light(k - 1) <= light(k)));
     }
 }

@@ -11,6 +11,7 @@
 //! (`paint`).
 
 mod base;
+mod boxes;
 mod clusters;
 mod color_table;
 mod directions;
@@ -22,9 +23,11 @@ mod lobes;
 mod reduce;
 mod residual;
 mod simulate;
+mod texels;
 
 pub use base::{CoatChoice, FitError, FittedBase, fit_base};
-pub use clusters::{BoxRule, ClusterSettings, Clusterer, NoTexel, SliceClusters};
+pub use boxes::BoxRule;
+pub use clusters::{ClusterSettings, Clusterer, NoTexel, SliceClusters};
 pub use flakes::{FittedFlakes, FlakeFitError, Progress, fit_flakes};
 pub use reduce::reduce_clusters;
 pub use simulate::{FlakeRecipe, simulate_flakes};

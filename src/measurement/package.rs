@@ -368,3 +368,6 @@ impl FlakePictures for FlakeSlices {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

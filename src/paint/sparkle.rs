@@ -77,7 +77,7 @@ pub struct FlakeSampler<'a> {
     persistence: [f32; 2],
     cumulative: Vec<f32>,
     /// For every slice and part of the unit interval the cluster to start looking from.
-    guide: Vec<u32>,
+    guide: Vec<u16>,
     boxes: Vec<RootBox>,
     /// Closed-form mean of every slice.
     means: Vec<[f32; 3]>,
@@ -110,7 +110,9 @@ impl<'a> FlakeSampler<'a> {
             }));
             let slice = &cumulative[first..];
             let part = |j: u16| f32::from(j) / f32::from(GUIDED);
-            guide.extend((0..GUIDED).map(|j| slice.partition_point(|&c| c <= part(j)).min(slice.len() - 1) as u32));
+            guide.extend((0..GUIDED).map(|j| {
+                slice.partition_point(|&c| c <= part(j)).min(slice.len() - 1).min(usize::from(u16::MAX)) as u16
+            }));
         }
         let root = |lab: &[f32; 3]| [(lab[0] + 16.0) / 116.0, lab[1] / 500.0, lab[2] / 200.0];
         let boxes = flakes.lower.iter().zip(&flakes.upper).map(|(lower, upper)| {
@@ -170,6 +172,24 @@ impl<'a> FlakeSampler<'a> {
         }
         let rgb = |k| sum[0] * self.to_rgb[0][k] + sum[1] * self.to_rgb[1][k] + sum[2] * self.to_rgb[2][k];
         (std::array::from_fn(rgb), mean)
+    }
+
+    /// Mean flake reflectance in 1/sr at an angle pair in degrees, as `Reflectance` has it.
+    #[must_use]
+    pub fn mean(&self, theta_h_deg: f32, theta_d_deg: f32) -> [f32; 3] {
+        let (row, column) = (self.theta_h.bracket(theta_h_deg), self.theta_d.bracket(theta_d_deg));
+        let columns = self.flakes.theta_d.len();
+        let at = |h: usize, d: usize| self.means[h * columns + d];
+        let corners =
+            [at(row.low, column.low), at(row.low, column.high), at(row.high, column.low), at(row.high, column.high)];
+        let (u, v) = (row.fraction, column.fraction);
+        let weights = [(1.0 - u) * (1.0 - v), (1.0 - u) * v, u * (1.0 - v), u * v];
+        std::array::from_fn(|k| {
+            corners[0][k] * weights[0]
+                + corners[1][k] * weights[1]
+                + corners[2][k] * weights[2]
+                + corners[3][k] * weights[3]
+        })
     }
 
     /// XYZ over white of one draw from slice `k`.

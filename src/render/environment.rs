@@ -117,6 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[allow(clippy::cast_precision_loss)]
     fn a_map_is_read_where_it_was_written() {
         let (width, height) = (8, 4);
         let pixels = (0..width * height).map(|k| [k as f32, 0.0, 1.0]).collect();

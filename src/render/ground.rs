@@ -4,6 +4,8 @@
 //! floor has the closed form `r² h / d³`; other shapes are sampled once on a grid, the same directions at every node,
 //! and read bilinearly.
 
+use rayon::prelude::*;
+
 use super::points::Points;
 use super::surface::Surface;
 use super::vector::Vec3;
@@ -18,7 +20,7 @@ pub(super) enum Ground {
     Grid(Vec<f32>),
 }
 
-const NODES: u16 = 96;
+const NODES: u16 = 72;
 const REACH: f32 = 3.2;
 
 impl Ground {
@@ -26,9 +28,9 @@ impl Ground {
         if matches!(surface, Surface::Sphere) {
             return Self::Ball;
         }
-        let directions: Vec<Vec3> = (0..256)
+        let directions: Vec<Vec3> = (0..192)
             .map(|k| {
-                let [u, v] = Points::of_pixel(0, 0, 256, 0x6d).pair(k, 0);
+                let [u, v] = Points::of_pixel(0, 0, 192, 0x6d).pair(k, 0);
                 let (r, turn) = (u.sqrt(), v * std::f32::consts::TAU);
                 [r * turn.cos(), (1.0 - u).sqrt(), r * turn.sin()]
             })
@@ -41,7 +43,8 @@ impl Ground {
             let share = met as f32 / directions.len() as f32;
             share
         };
-        Self::Grid((0..NODES).flat_map(|z| (0..NODES).map(move |x| (z, x))).map(|(z, x)| hidden(z, x)).collect())
+        let rows = (0..NODES).into_par_iter().map(|z| (0..NODES).map(|x| hidden(z, x)).collect());
+        Self::Grid(rows.collect::<Vec<Vec<f32>>>().concat())
     }
 
     /// Share of the sky hidden from a point of the floor.

@@ -7,14 +7,14 @@
 //! Besides the value, an evaluation gives the density with which [`Kernel::sample`] would have drawn the light
 //! direction: a mixture of the coat's highlight, the lobes (inside the coat) and a cosine, all normalised.
 
+#![allow(clippy::inline_always)] // one kernel per kind of paint, without calls inside
+
 use std::f32::consts::{PI, TAU};
 
-use super::lanes::{Lanes, Lanes3, WIDTH, add, dot, sub, times};
-use super::vector::{self, Vec3, along, scale};
-use crate::paint::{CarPaint, Coat, FlakeSampler, MIN_ALPHA, QuickBracket, QuickGrid, Reflectance};
-
-/// Cosines are not taken below this; at grazing a pixel must stay finite.
-const LEAST_COSINE: f32 = 1e-4;
+use super::lanes::{Lanes, Lanes3, WIDTH, get, set};
+use super::optics::{CoatKernel, Half, LEAST_COSINE, beckmann_half, mirrored};
+use super::vector::{Vec3, along, mix, scale};
+use crate::paint::{CarPaint, FlakeSampler, MIN_ALPHA, QuickBracket, QuickGrid, Reflectance};
 
 /// Lobes narrower than this are also drawn by their own shape; wider ones are served by drawing lights alone.
 const NARROW: f64 = 0.06;
@@ -45,16 +45,6 @@ struct LobeKernel {
     share: f32,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct CoatKernel {
-    ior: f32,
-    inverse_ior: f32,
-    alpha2: f32,
-    /// Share of the drawn directions; 0 for a mirror.
-    share: f32,
-    mirror: bool,
-}
-
 /// The view side of an evaluation, common to all lights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
@@ -66,7 +56,7 @@ pub(super) struct View {
 /// Paint towards one light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Answer {
-    /// BRDF, 1/sr.
+    /// BRDF, 1/sr. A texel's sensor noise may make it negative; a pixel is clamped, so that its mean stays right.
     pub(super) f: Lanes3,
     /// Density of [`Kernel::sample`], 1/sr.
     pub(super) density: Lanes,
@@ -123,13 +113,15 @@ impl<'a> Kernel<'a> {
     }
 
     /// BRDF and density for light directions above the horizon; below it the answer means nothing, but is finite.
+    ///
+    /// Flakes show their mean and `contrast` times their deviation from it; without a contrast the mean alone.
     #[inline(always)]
     pub(super) fn evaluate<const COATED: bool, const FLAKES: bool>(
         &self,
         view: &View,
         light: Lanes3,
         cells: &Cells,
-        contrast: Lanes,
+        contrast: Option<Lanes>,
     ) -> Answer {
         let outer = [light[0], light[1], light[2].at_least(LEAST_COSINE)];
         let (mut inner, mut transmission) = (outer, Lanes::splat(1.0));
@@ -167,13 +159,19 @@ impl<'a> Kernel<'a> {
         color = std::array::from_fn(|k| color[k] * sum[k]);
         if FLAKES && let Some(flakes) = &self.flakes {
             for (k, cell) in cells.iter().enumerate() {
-                let (flake, mean) = flakes.color_and_mean(*cell, theta_h.0[k], theta_d.0[k]);
-                for c in 0..3 {
-                    color[c].0[k] += mean[c] + (flake[c] - mean[c]) * contrast.0[k];
+                let flake = match contrast {
+                    Some(contrast) => {
+                        let (flake, mean) = flakes.color_and_mean(*cell, theta_h.0[k], theta_d.0[k]);
+                        mix(mean, flake, contrast.0[k])
+                    }
+                    None => flakes.mean(theta_h.0[k], theta_d.0[k]),
+                };
+                for (lanes, value) in color.iter_mut().zip(flake) {
+                    lanes.0[k] += value;
                 }
             }
         }
-        Answer { f: color.map(|v| (v * transmission + highlight).at_least(0.0)), density }
+        Answer { f: color.map(|v| v * transmission + highlight), density }
     }
 
     #[inline(always)]
@@ -185,7 +183,7 @@ impl<'a> Kernel<'a> {
         for k in 0..WIDTH {
             let (row, column) = (self.chi_h.bracket(theta_h.0[k]), self.chi_d.bracket(theta_d.0[k]));
             let node = bilinear(&self.chi, self.chi_d.len(), row, column);
-            super::lanes::set(&mut color, k, node);
+            set(&mut color, k, node);
         }
         color
     }
@@ -207,110 +205,18 @@ impl<'a> Kernel<'a> {
         if COATED && !self.coat.mirror {
             rest -= self.coat.share;
             if rest < 0.0 {
-                return mirrored(super::lanes::get(&view.outer, k), beckmann_half(self.coat.alpha2, u, v));
+                return mirrored(get(&view.outer, k), beckmann_half(self.coat.alpha2, u, v));
             }
         }
         let last = self.lobes.len().checked_sub(1)?;
         for (index, lobe) in self.lobes.iter().enumerate() {
             rest -= lobe.share;
             if rest < 0.0 || index == last {
-                let inner = mirrored(super::lanes::get(&view.inner, k), beckmann_half(lobe.alpha2, u, v))?;
+                let inner = mirrored(get(&view.inner, k), beckmann_half(lobe.alpha2, u, v))?;
                 return if COATED { self.coat.leave(inner) } else { Some(inner) };
             }
         }
         None
-    }
-}
-
-fn beckmann_half(alpha2: f32, u: f32, v: f32) -> Vec3 {
-    let tan2 = -alpha2 * (1.0 - u).ln();
-    let cos = 1.0 / (1.0 + tan2).sqrt();
-    let (sin, turn) = ((1.0 - cos * cos).max(0.0).sqrt(), v * TAU);
-    [sin * turn.cos(), sin * turn.sin(), cos]
-}
-
-fn mirrored(o: Vec3, h: Vec3) -> Option<Vec3> {
-    let h_o = vector::dot(h, o);
-    let i = along(scale(h, 2.0 * h_o), o, -1.0);
-    (h_o > 0.0 && i[2] > 0.0).then_some(i)
-}
-
-impl CoatKernel {
-    const ABSENT: Self = Self { ior: 1.0, inverse_ior: 1.0, alpha2: 0.0, share: 0.0, mirror: true };
-
-    #[allow(clippy::cast_possible_truncation)]
-    fn new(coat: &Coat) -> Self {
-        if coat.ior <= 1.0 {
-            return Self::ABSENT;
-        }
-        let (ior, roughness, mirror) = (coat.ior as f32, coat.roughness as f32, coat.is_mirror());
-        let share = if mirror { 0.0 } else { 0.5 };
-        Self { ior, inverse_ior: 1.0 / ior, alpha2: roughness * roughness, share, mirror }
-    }
-
-    #[inline(always)]
-    fn refract(&self, w: Lanes3) -> Lanes3 {
-        let (x, y) = (w[0] * self.inverse_ior, w[1] * self.inverse_ior);
-        [x, y, (-(x * x + y * y) + 1.0).at_least(LEAST_COSINE * LEAST_COSINE).sqrt()]
-    }
-
-    fn leave(&self, w: Vec3) -> Option<Vec3> {
-        let (x, y) = (w[0] * self.ior, w[1] * self.ior);
-        let z2 = 1.0 - x * x - y * y;
-        (z2 > 0.0).then(|| [x, y, z2.sqrt()])
-    }
-
-    #[inline(always)]
-    fn fresnel(&self, cos: Lanes) -> Lanes {
-        let inner = ((cos * cos - 1.0) * (self.inverse_ior * self.inverse_ior) + 1.0).at_least(0.0).sqrt();
-        let s = (cos - inner * self.ior) / (cos + inner * self.ior);
-        let p = (cos * self.ior - inner) / (cos * self.ior + inner);
-        (s * s + p * p) * 0.5
-    }
-}
-
-/// Half vectors of directions above the horizon.
-#[derive(Clone, Copy, Debug)]
-struct Half {
-    across: Lanes,
-    tan2: Lanes,
-    inverse_z4: Lanes,
-    h_z: Lanes,
-    h_o: Lanes,
-    /// Twice sine and cosine of θd.
-    sine2: Lanes,
-    cosine2: Lanes,
-}
-
-impl Half {
-    #[inline(always)]
-    fn of(i: Lanes3, o: Lanes3) -> Self {
-        let (sum, difference) = (add(i, o), sub(i, o));
-        let cosine2 = dot(sum, sum).at_least(1e-12).sqrt();
-        let sine2 = dot(difference, difference).sqrt();
-        let h = times(sum, Lanes::splat(1.0) / cosine2);
-        let across2 = h[0] * h[0] + h[1] * h[1];
-        let inverse_z2 = Lanes::splat(1.0) / (h[2] * h[2]);
-        Self {
-            across: across2.sqrt(),
-            tan2: across2 * inverse_z2,
-            inverse_z4: inverse_z2 * inverse_z2,
-            h_z: h[2],
-            h_o: cosine2 / (sine2 * sine2 + cosine2 * cosine2).sqrt(),
-            sine2,
-            cosine2,
-        }
-    }
-
-    /// D without 1/π.
-    #[inline(always)]
-    fn beckmann(&self, inverse_alpha2: f32) -> Lanes {
-        (self.tan2 * inverse_alpha2).exp_of_negative() * inverse_alpha2 * self.inverse_z4
-    }
-
-    #[inline(always)]
-    fn masking(&self, i_z: Lanes, o_z: Lanes) -> Lanes {
-        (Lanes::splat(1.0) / (i_z * o_z)).min(self.h_z * 2.0 / (self.h_o * i_z.max(o_z)))
     }
 }
 
@@ -327,8 +233,8 @@ fn bilinear(table: &[Vec3], columns: usize, row: QuickBracket, column: QuickBrac
 mod tests {
     use super::*;
     use crate::color::Lab;
-    use crate::paint::{AngleGrid, Chi, ColorTable, Direction, Lobe};
-    use crate::render::lanes::{get, splat3};
+    use crate::paint::{AngleGrid, Chi, Coat, ColorTable, Direction, Lobe};
+    use crate::render::lanes::splat3;
     use proptest::prelude::*;
 
     fn paint(coat: Option<Coat>) -> CarPaint {
@@ -362,23 +268,27 @@ mod tests {
     fn answer<const COATED: bool>(paint: &CarPaint, wi: Direction, wo: Direction) -> Answer {
         let kernel = Kernel::new(paint);
         let view = kernel.view::<COATED>(single(wo));
-        kernel.evaluate::<COATED, false>(&view, single(wi), &[0; WIDTH], Lanes::splat(1.0))
+        kernel.evaluate::<COATED, false>(&view, single(wi), &[0; WIDTH], None)
     }
 
     proptest! {
         #[test]
         fn the_kernel_says_what_the_reflectance_says(
-            iz in 0.02..1.0_f64, oz in 0.02..1.0_f64, turn in 0.0..std::f64::consts::TAU, ior in 1.05..2.5_f64, rough in 0.0..0.3_f64,
+            iz in 0.02..1.0_f64, oz in 0.02..1.0_f64, turn in 0.0..std::f64::consts::TAU, ior in 1.0..2.5_f64, rough in 0.0..0.3_f64,
         ) {
             let (wi, wo) = (direction(iz, turn), direction(oz, 0.0));
             for coat in [None, Some(Coat { ior, roughness: rough, thickness_um: None })] {
                 let paint = paint(coat);
                 let want = Reflectance::new(&paint).evaluate(wi, wo, Chi::Table);
                 let got = if coat.is_some() { answer::<true>(&paint, wi, wo) } else { answer::<false>(&paint, wi, wo) };
+                // At a cosine of 0.02 the half vector of f32 directions is off by 2.5e-6; out to four widths that turns
+                // a lobe by up to 2e-5 over its width, doubled for the coat's own rounding.
+                let narrowest = if coat.is_some() && rough >= Coat::MIRROR_ROUGHNESS { rough.min(0.09) } else { 0.09 };
+                let accepted = 2e-3 + 5e-5 / narrowest;
                 for (x, y) in get(&got.f, 2).iter().zip(want) {
-                    // An f32 unit vector is off by 6e-8; a lobe of width 0.02 turns that into 1e-5 of its value per
-                    // width, times the distance from the peak.
-                    prop_assert!((f64::from(*x) - y).abs() <= 2e-3 * y + 1e-5, "{x} instead of {y}");
+                    // The kernel leaves the clamp at 0 to the pixel.
+                    let x = f64::from(x.max(0.0));
+                    prop_assert!((x - y).abs() <= accepted * y + 1e-5, "{x} instead of {y}");
                 }
             }
         }
@@ -389,7 +299,7 @@ mod tests {
         ) {
             let paint = paint(Some(Coat { ior: 1.5, roughness: rough, thickness_um: None }));
             let got = answer::<true>(&paint, direction(iz, turn), direction(oz, 0.0));
-            prop_assert!(get(&got.f, 0).iter().all(|v| v.is_finite() && *v >= 0.0));
+            prop_assert!(get(&got.f, 0).iter().all(|v| v.is_finite()));
             prop_assert!(got.density.0[0].is_finite());
         }
     }
@@ -410,7 +320,7 @@ mod tests {
                     continue;
                 };
                 let light = splat3(light);
-                let answer = kernel.evaluate::<true, false>(&view, light, &[0; WIDTH], Lanes::splat(1.0));
+                let answer = kernel.evaluate::<true, false>(&view, light, &[0; WIDTH], None);
                 sum += f64::from(light[2].0[0] / answer.density.0[0]);
             }
             let projected = sum / f64::from(1 << 16);

@@ -1,4 +1,5 @@
 //! Eight single-precision numbers that go through the same arithmetic, in a form compilers turn into vector code.
+#![allow(clippy::inline_always)] // a call would cost more than what it does
 
 use std::array::from_fn;
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -8,11 +8,10 @@
 //! light of the grid. A small floor under the radiance keeps every direction
 //! possible, and the density follows the most radiance of a part, not its mean: none is drawn that outshines it.
 
-use std::f32::consts::{PI, TAU};
+use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
-use super::environment::{Environment, Map, Source, luminance};
+use super::environment::{Environment, luminance};
+use super::light_grid::{Grid, HEIGHT, WIDTH};
 use super::vector::{Vec3, dot, scale, unit};
 
 /// One drawn direction.
@@ -26,10 +25,14 @@ pub(super) struct LightSample {
 }
 
 /// An environment prepared for sampling.
-#[derive(Clone, Debug)]
-pub(super) struct LightTable {
+#[derive(Debug)]
+pub(super) struct LightTable<'a> {
+    environment: &'a Environment,
     grid: Grid,
-    facings: Vec<Facing>,
+    /// Middle of each cell and its share of the sphere.
+    cells: Vec<(Vec3, f64)>,
+    /// Made when a surface first faces that way: small pictures and flat shapes need few.
+    facings: Vec<OnceLock<Facing>>,
 }
 
 /// Lights as a surface sees them.
@@ -49,16 +52,6 @@ const EDGE: usize = 6;
 /// Drawn directions a side: 32 x 32 strata, as many as stay in a core's first cache.
 const STRATA: u16 = 32;
 
-/// Share of the mean luminance added everywhere.
-const FLOOR: f32 = 0.03;
-
-/// Coarse cells.
-const WIDTH: usize = 128;
-const HEIGHT: usize = 64;
-
-/// Finer parts a side of a coarse cell, at most.
-const FINEST: usize = 16;
-
 /// Cosine at the middle of a facing, widened to what surfaces that are a little turned see.
 fn weight(cosine: f32) -> f32 {
     if cosine > -0.3 { (cosine + 0.12).max(0.02) } else { 0.0 }
@@ -77,20 +70,22 @@ fn middle_of(facing: usize) -> Vec3 {
 }
 
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-impl LightTable {
+impl<'a> LightTable<'a> {
     /// Prepares an environment; `None` for one without light.
-    pub(super) fn new(environment: &Environment) -> Option<Self> {
+    pub(super) fn new(environment: &'a Environment) -> Option<Self> {
         let mut grid = Grid::new(environment);
         let mean = grid.raise_floor();
         if mean <= 0.0 {
             return None;
         }
         let cells: Vec<(Vec3, f64)> = (0..WIDTH * HEIGHT).map(|k| (Grid::center(k), Grid::share(k))).collect();
-        let facings = (0..6 * EDGE * EDGE)
-            .into_par_iter()
-            .map(|k| Facing::new(middle_of(k), &grid, &cells, environment))
-            .collect();
-        Some(Self { grid, facings })
+        let facings = (0..6 * EDGE * EDGE).map(|_| OnceLock::new()).collect();
+        Some(Self { environment, grid, cells, facings })
+    }
+
+    fn seen_from(&self, facing: usize) -> &Facing {
+        let make = || Facing::new(middle_of(facing), &self.grid, &self.cells, self.environment);
+        self.facings[facing].get_or_init(make)
     }
 
     /// Number of the facing of a unit normal.
@@ -105,24 +100,19 @@ impl LightTable {
     /// The drawn direction of a sample point.
     pub(super) fn sample(&self, facing: usize, [u, v]: [f32; 2]) -> &LightSample {
         let stratum = |x: f32| ((x * f32::from(STRATA)) as usize).min(usize::from(STRATA) - 1);
-        &self.facings[facing].samples[stratum(v) * usize::from(STRATA) + stratum(u)]
+        &self.seen_from(facing).samples[stratum(v) * usize::from(STRATA) + stratum(u)]
     }
 
     /// Density of drawing a unit direction, 1/sr.
     pub(super) fn density(&self, facing: usize, d: Vec3) -> f32 {
-        let fine = self.grid.fine;
-        let u = (d[0].atan2(-d[2]) / TAU).rem_euclid(1.0) * (WIDTH * fine) as f32;
-        let v = d[1].clamp(-1.0, 1.0).acos() / PI * (HEIGHT * fine) as f32;
-        let (x, y) = ((u as usize).min(WIDTH * fine - 1), (v as usize).min(HEIGHT * fine - 1));
-        let cell = y / fine * WIDTH + x / fine;
-        let part = cell * fine * fine + y % fine * fine + x % fine;
-        let facing = &self.facings[facing];
+        let (cell, part) = self.grid.find(d);
+        let facing = self.seen_from(facing);
         self.grid.parts[part] * weight(dot(Grid::center(cell), facing.normal)) * facing.scale
     }
 
     /// Solid angle from which a surface gets most of its light, sr.
     pub(super) fn extent(&self, facing: usize) -> f32 {
-        self.facings[facing].extent
+        self.seen_from(facing).extent
     }
 }
 
@@ -171,105 +161,6 @@ impl Facing {
     }
 }
 
-/// Luminance by direction: coarse cells, and finer parts of each.
-#[derive(Clone, Debug)]
-struct Grid {
-    /// Mean luminance, row by row.
-    cells: Vec<f32>,
-    fine: usize,
-    /// Most luminance, cell by cell, `fine` rows of `fine`; with the floor.
-    parts: Vec<f32>,
-    /// Mean of a cell's parts.
-    bounds: Vec<f32>,
-}
-
-#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
-impl Grid {
-    fn new(environment: &Environment) -> Self {
-        // Parts are no smaller than a map's pixels, and are looked at as finely as those.
-        let (fine, dense) = match environment.source() {
-            Source::Uniform(_) => (1, 1),
-            Source::Studio(_) => (4, 1),
-            Source::Map(map) => {
-                let fine = map.width.div_ceil(WIDTH).max(map.height.div_ceil(HEIGHT)).clamp(1, FINEST);
-                (fine, map.width.div_ceil(WIDTH * fine).max(map.height.div_ceil(HEIGHT * fine)))
-            }
-        };
-        let light = |u: f32, v: f32| match environment.source() {
-            Source::Map(map) => luminance(map.at(u, v)),
-            Source::Studio(_) | Source::Uniform(_) => luminance(environment.radiance(Map::direction(u, v))),
-        };
-        let found: Vec<(f32, f32)> = (0..WIDTH * HEIGHT * fine * fine)
-            .into_par_iter()
-            .map(|k| {
-                let (cell, part) = (k / (fine * fine), k % (fine * fine));
-                let corner = [cell % WIDTH * fine + part % fine, cell / WIDTH * fine + part / fine];
-                // The trapezoidal rule at the corners, edges and middle of each pixel: exact for bilinear light.
-                let (mut sum, mut most) = (0.0, 0.0_f32);
-                let last = 2 * dense;
-                for (row, column) in (0..=last).flat_map(|r| (0..=last).map(move |c| (r, c))) {
-                    let place = |corner: usize, k: usize| corner as f32 + k as f32 / last as f32;
-                    let u = place(corner[0], column) / (WIDTH * fine) as f32;
-                    let v = place(corner[1], row) / (HEIGHT * fine) as f32;
-                    let share = |k: usize| if k == 0 || k == last { 0.5 } else { 1.0 };
-                    let here = light(u, v);
-                    sum += here * share(row) * share(column);
-                    most = most.max(here);
-                }
-                (sum / (last * last) as f32, most)
-            })
-            .collect();
-        let each = fine * fine;
-        let mean = |parts: &[(f32, f32)]| parts.iter().map(|p| p.0).sum::<f32>() / each as f32;
-        let cells = found.chunks(each).map(mean).collect();
-        Self { cells, fine, parts: found.into_iter().map(|p| p.1).collect(), bounds: Vec::new() }
-    }
-
-    /// Adds the floor to the parts; the mean luminance of the sphere.
-    fn raise_floor(&mut self) -> f64 {
-        let mean: f64 = self.cells.iter().enumerate().map(|(k, &light)| f64::from(light) * Self::share(k)).sum();
-        let each = self.fine * self.fine;
-        for light in &mut self.parts {
-            *light += FLOOR * mean as f32;
-        }
-        self.bounds = self.parts.chunks(each).map(|parts| parts.iter().sum::<f32>() / each as f32).collect();
-        mean
-    }
-
-    /// Height on the unit sphere of the upper edge of a row.
-    fn edge(row: usize) -> f64 {
-        (std::f64::consts::PI * row as f64 / HEIGHT as f64).cos()
-    }
-
-    /// Share of the sphere that a cell covers.
-    fn share(cell: usize) -> f64 {
-        let row = cell / WIDTH;
-        (Self::edge(row) - Self::edge(row + 1)) / 2.0 / WIDTH as f64
-    }
-
-    fn center(cell: usize) -> Vec3 {
-        let (x, y) = (cell % WIDTH, cell / WIDTH);
-        Map::direction((x as f32 + 0.5) / WIDTH as f32, (y as f32 + 0.5) / HEIGHT as f32)
-    }
-
-    /// Part of a cell by radiance, and a direction in it even in solid angle.
-    fn refine(&self, cell: usize, across: f64, down: f64) -> (usize, Vec3) {
-        let fine = self.fine;
-        let parts = &self.parts[cell * fine * fine..(cell + 1) * fine * fine];
-        let rows: [f64; FINEST] = std::array::from_fn(|r| {
-            parts.get(r * fine..(r + 1) * fine).map_or(0.0, |row| row.iter().map(|&v| f64::from(v)).sum())
-        });
-        let (row, down) = walk(rows[..fine].iter().copied(), down);
-        let (column, across) = walk(parts[row * fine..(row + 1) * fine].iter().map(|&v| f64::from(v)), across);
-        let theta = ((cell / WIDTH) as f64 + (row as f64 + down) / fine as f64) / HEIGHT as f64 * std::f64::consts::PI;
-        let turn = ((cell % WIDTH) as f64 + (column as f64 + across) / fine as f64) / WIDTH as f64;
-        let (sine, y) = theta.sin_cos();
-        let turn = turn * std::f64::consts::TAU;
-        let direction = [(sine * turn.sin()) as f32, y as f32, (-sine * turn.cos()) as f32];
-        (cell * fine * fine + row * fine + column, direction)
-    }
-}
-
 /// Cumulative weights to search.
 struct Search {
     sums: Vec<f64>,
@@ -300,23 +191,11 @@ impl Search {
     }
 }
 
-/// The same for few weights that are searched once.
-fn walk(weights: impl Iterator<Item = f64> + Clone, share: f64) -> (usize, f64) {
-    let target = share * weights.clone().sum::<f64>();
-    let (mut below, mut last) = (0.0, 0);
-    for (k, w) in weights.enumerate() {
-        if target < below + w {
-            return (k, (target - below) / w);
-        }
-        below += w;
-        last = k;
-    }
-    (last, 0.5)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::environment::Map;
+    use std::f32::consts::{PI, TAU};
 
     #[test]
     fn a_facing_is_found_from_its_middle() {
@@ -333,7 +212,7 @@ mod tests {
         let environment = Environment::map(Map { width, height, pixels: pixels.collect() });
         let table = LightTable::new(&environment).expect("light");
         for normal in [[0.0, 1.0, 0.0], unit([0.5, 0.2, -0.7]), unit([-0.3, -0.8, 0.4])] {
-            let samples = &table.facings[LightTable::facing(normal)].samples;
+            let samples = &table.seen_from(LightTable::facing(normal)).samples;
             #[allow(clippy::cast_precision_loss)]
             let drawn: f32 = samples.iter().map(|s| s.light[1] * dot(s.direction, normal).max(0.0)).sum::<f32>()
                 / samples.len() as f32;
@@ -353,9 +232,10 @@ mod tests {
 
     #[test]
     fn densities_of_drawn_directions_are_the_stated_ones() {
-        let table = LightTable::new(&Environment::studio()).expect("light");
+        let environment = Environment::studio();
+        let table = LightTable::new(&environment).expect("light");
         let facing = LightTable::facing(unit([0.1, 0.7, 0.6]));
-        for sample in table.facings[facing].samples.iter().step_by(37) {
+        for sample in table.seen_from(facing).samples.iter().step_by(37) {
             let stated = table.density(facing, sample.direction);
             // A direction on the edge of a cell may be counted to its neighbour.
             assert!((stated / sample.density - 1.0).abs() < 1e-4 || stated > 0.0);

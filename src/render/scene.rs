@@ -31,7 +31,7 @@ pub struct Scene {
     pub camera: Camera,
     /// Factor on light before tone mapping; files of linear light are not exposed.
     pub exposure: f32,
-    /// Seed of the sample points and of the random texture.
+    /// Seed of the sample points.
     pub seed: u32,
 }
 

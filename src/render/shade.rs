@@ -9,15 +9,13 @@ use super::environment::Source;
 use super::ground::Ground;
 use super::kernel::{Kernel, View};
 use super::lanes::{self, Lanes, Lanes3, WIDTH, get, set, splat3, times};
+use super::lens::Lens;
 use super::light_table::LightTable;
 use super::points::Points;
 use super::scene::{Background, Scene};
 use super::surface::{Hit, Surface};
-use super::vector::{Frame, Vec3, add, along, cross, dot, scale, smoothstep, sub, unit};
+use super::vector::{Frame, Vec3, add, along, scale, smoothstep, unit};
 use crate::paint::{CarPaint, RandomTexture, cell_spacing};
-
-/// Texels a side of the random texture's tile; every repetition of it is drawn anew.
-const TILE: u32 = 256;
 
 /// A scene prepared for shading one paint.
 pub(super) struct Shader<'a> {
@@ -26,7 +24,7 @@ pub(super) struct Shader<'a> {
     surface: Surface,
     ground: Ground,
     lights: Vec<(Vec3, Vec3)>,
-    light_table: Option<LightTable>,
+    light_table: Option<LightTable<'a>>,
     texture: Option<Texture>,
     /// Independent flakes a texel shows per solid angle of light.
     flakes_per_sr: f32,
@@ -102,17 +100,6 @@ const fn lights(flakes: bool) -> u32 {
     if flakes { 2 } else { 4 }
 }
 
-/// Rays of the camera.
-struct Lens {
-    right: Vec3,
-    up: Vec3,
-    forward: Vec3,
-    half: [f32; 2],
-    pixel: [f32; 2],
-    /// Side of a pixel at distance 1.
-    pixel_size: f32,
-}
-
 impl<'a> Shader<'a> {
     pub(super) fn new(paint: &'a CarPaint, scene: &'a Scene) -> (Self, EffectPlan) {
         let light_table = LightTable::new(&scene.environment);
@@ -122,10 +109,9 @@ impl<'a> Shader<'a> {
             let t = &flakes.texture;
             #[allow(clippy::cast_possible_truncation)] // pixels are f32
             let texels_per_unit = (scene.object_mm * 500.0 / t.texel_um) as f32;
-            let spacing = cell_spacing(t.grain_um / t.texel_um);
-            let tile = RandomTexture::new(TILE, TILE, spacing, scene.seed);
+            let tile = RandomTexture::of(t);
             #[allow(clippy::cast_possible_truncation)]
-            let cell = spacing.max(1.0) as f32;
+            let cell = cell_spacing(t.grain_um / t.texel_um).max(1.0) as f32;
             Texture { tile, texels_per_unit, cell }
         });
         // Turning a light by an angle turns the half vector by half of it.
@@ -182,7 +168,7 @@ impl<'a> Shader<'a> {
             sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points));
         }
         #[allow(clippy::cast_precision_loss)] // a few thousand
-        scale(sum, 1.0 / count as f32)
+        scale(sum, 1.0 / count as f32).map(|v| v.max(0.0))
     }
 
     /// Number of the texel at a point.
@@ -201,7 +187,7 @@ impl<'a> Shader<'a> {
         let view = self.kernel.view::<COATED>(batch.local(batch.eye));
         let texels = if FLAKES { self.texels_seen(batch, &view) } else { Lanes::splat(1.0) };
         let mut sum = [Lanes::splat(0.0); 3];
-        let mut shine = |light: Lanes3, power: Lanes3, drawn: Option<Lanes>, contrast: Lanes| {
+        let mut shine = |light: Lanes3, power: Lanes3, drawn: Option<Lanes>, contrast: Option<Lanes>| {
             let answer = self.kernel.evaluate::<COATED, FLAKES>(&view, light, &batch.cells, contrast);
             let mut weight = light[2].at_least(0.0);
             if let Some(density) = drawn {
@@ -209,11 +195,11 @@ impl<'a> Shader<'a> {
             }
             sum = std::array::from_fn(|k| sum[k] + answer.f[k] * power[k] * weight);
         };
-        let lone = self.contrast(texels, 1.0);
+        let lone = self.contrast(texels);
         for &(towards, irradiance) in &self.lights {
             let light = batch.local(splat3(towards));
             if light[2].0.iter().any(|&z| z > 0.0) {
-                shine(light, splat3(irradiance), None, lone);
+                shine(light, splat3(irradiance), None, Some(lone));
             }
         }
         if let Some(table) = &self.light_table {
@@ -221,37 +207,38 @@ impl<'a> Shader<'a> {
             #[allow(clippy::cast_precision_loss)] // a few
             let count_f = count as f32;
             let facing: [usize; WIDTH] = std::array::from_fn(|k| LightTable::facing(get(&batch.normal, k)));
-            let mut many = lone;
-            if FLAKES {
+            // One of the directions carries the flakes' deviations for all of them; the others see the mean.
+            let many = FLAKES.then(|| {
                 let extent = Lanes(facing.map(|k| table.extent(k)));
-                many = self.contrast(texels * (extent * self.flakes_per_sr).at_least(1.0), count_f);
-            }
+                self.contrast(texels * (extent * self.flakes_per_sr).at_least(1.0))
+            });
             for draw in 0..count {
+                let contrast = many.filter(|_| draw == 0).map(|contrast| contrast * count_f);
                 let (mut directions, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
                 let mut density = Lanes::splat(1.0);
-                for k in 0..WIDTH {
-                    let drawn = table.sample(facing[k], points.one_of(draw, count, batch.index[k], 1));
+                for (k, &facing) in facing.iter().enumerate() {
+                    let drawn = table.sample(facing, points.one_of(draw, count, batch.index[k], 1));
                     set(&mut directions, k, drawn.direction);
                     set(&mut power, k, drawn.light);
                     density.0[k] = drawn.density;
                 }
                 let light = batch.local(directions);
                 if self.kernel.draws {
-                    shine(light, times(power, density), Some(density * count_f), many);
+                    shine(light, times(power, density), Some(density * count_f), contrast);
                 } else {
-                    shine(light, times(power, Lanes::splat(1.0 / count_f)), None, many);
+                    shine(light, times(power, Lanes::splat(1.0 / count_f)), None, contrast);
                 }
             }
             if self.kernel.draws {
                 let (mut light, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
                 let mut density = Lanes::splat(1.0);
-                for k in 0..batch.count {
+                for (k, &facing) in facing.iter().enumerate().take(batch.count) {
                     let (pick, place) = (points.pair(batch.index[k], 3)[0], points.pair(batch.index[k], 2));
                     if let Some(drawn) = self.kernel.sample::<COATED>(&view, k, pick, place) {
                         let direction = batch.world(k, drawn);
                         set(&mut light, k, drawn);
                         set(&mut power, k, self.scene.environment.radiance(direction));
-                        density.0[k] = table.density(facing[k], direction);
+                        density.0[k] = table.density(facing, direction);
                     }
                 }
                 shine(light, power, Some(density * count_f), many);
@@ -282,8 +269,8 @@ impl<'a> Shader<'a> {
     /// to what is left of them in the mean of all, so that sparkle keeps its contrast and sampling adds no noise of its
     /// own; with more samples than flakes every flake is drawn as it is.
     #[allow(clippy::cast_precision_loss)] // a few thousand
-    fn contrast(&self, independent: Lanes, draws: f32) -> Lanes {
-        let drawn = self.scene.samples_per_pixel as f32 * draws;
+    fn contrast(&self, independent: Lanes) -> Lanes {
+        let drawn = self.scene.samples_per_pixel as f32;
         (Lanes::splat(drawn) / independent.at_least(1.0)).min(Lanes::splat(1.0)).sqrt()
     }
 
@@ -315,35 +302,4 @@ fn sweep(place: [f32; 2], shade: f32) -> Vec3 {
     let out = (place[0] * place[0] * 0.7 + (place[1] - 0.15).powi(2)).sqrt();
     let light = 0.40 - 0.24 * smoothstep(0.0, 1.5, out) + 0.07 * smoothstep(-0.2, -1.0, place[1]);
     [light * (1.0 - 0.86 * shade); 3]
-}
-
-impl Lens {
-    #[allow(clippy::cast_precision_loss)] // picture sizes
-    fn new(scene: &Scene) -> Self {
-        let forward = unit(sub(scene.camera.target, scene.camera.origin));
-        let level = cross(forward, [0.0, 1.0, 0.0]);
-        let right = if dot(level, level) > 1e-9 { unit(level) } else { [1.0, 0.0, 0.0] };
-        let tangent = (scene.camera.field_of_view_deg.to_radians() / 2.0).tan();
-        let [width, height] = scene.size.map(|s| s as f32);
-        let short = width.min(height);
-        let half = [tangent * width / short, tangent * height / short];
-        Self {
-            right,
-            up: cross(right, forward),
-            forward,
-            half,
-            pixel: [2.0 / width, 2.0 / height],
-            pixel_size: 2.0 * tangent / short,
-        }
-    }
-
-    /// Direction through a place in a pixel, and the place in the picture.
-    #[allow(clippy::cast_precision_loss)]
-    fn ray(&self, x: u32, y: u32, [u, v]: [f32; 2]) -> (Vec3, [f32; 2]) {
-        let place = [(x as f32 + u) * self.pixel[0] - 1.0, 1.0 - (y as f32 + v) * self.pixel[1]];
-        let sideways = along(self.forward, self.right, place[0] * self.half[0]);
-        let short = self.half[0].min(self.half[1]);
-        let even = [place[0] * self.half[0] / short, place[1] * self.half[1] / short];
-        (unit(along(sideways, self.up, place[1] * self.half[1])), even)
-    }
 }

@@ -18,6 +18,8 @@ struct SoftBox {
     radiance: f32,
     /// Share of the radiance lost from the middle to the border, as a diffuser cloth shows it.
     falloff: f32,
+    /// Cosine from the center beyond which nothing of the box is seen.
+    reach: f32,
 }
 
 /// The studio's lights, placed.
@@ -61,14 +63,16 @@ fn soft_box(center: Vec3, roll_deg: f32, half: [f32; 2], border: f32, radiance: 
     let steep = cross(center, level);
     let (s, c) = roll_deg.to_radians().sin_cos();
     let across = std::array::from_fn(|k| level[k] * c + steep[k] * s);
-    SoftBox { center, across, upwards: cross(center, across), half, border, radiance, falloff }
+    let corner = [half[0] + border, half[1] + border];
+    let reach = 1.0 / (1.0 + corner[0] * corner[0] + corner[1] * corner[1]).sqrt();
+    SoftBox { center, across, upwards: cross(center, across), half, border, radiance, falloff, reach }
 }
 
 impl SoftBox {
     /// How much of this direction the box covers, and with what radiance.
     fn seen(&self, direction: Vec3) -> (f32, f32) {
         let towards = dot(direction, self.center);
-        if towards <= 0.05 {
+        if towards < self.reach {
             return (0.0, 0.0);
         }
         let place = scale(direction, 1.0 / towards);
