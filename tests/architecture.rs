@@ -18,21 +18,82 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("render", &["paint", "color"]),
     ("export", &["paint", "blend", "color"]),
     // Profiles are the rooms' settings together, so accuracy sees every room below it.
-    ("accuracy", &["color", "transport", "paint", "measurement", "fit", "blend", "render", "export"]),
+    (
+        "accuracy",
+        &[
+            "color",
+            "transport",
+            "paint",
+            "measurement",
+            "fit",
+            "blend",
+            "render",
+            "export",
+        ],
+    ),
     ("store", &[]),
     (
         "workshop",
-        &["color", "transport", "paint", "measurement", "fit", "blend", "render", "export", "accuracy", "store"],
+        &[
+            "color",
+            "transport",
+            "paint",
+            "measurement",
+            "fit",
+            "blend",
+            "render",
+            "export",
+            "accuracy",
+            "store",
+        ],
     ),
     // Both doors hand the types of the use cases through: settings, limits, weights, progress.
     ("studio", &[]),
-    ("service", &["studio", "workshop", "store", "accuracy", "blend", "paint", "measurement"]),
-    ("cli", &["workshop", "service", "accuracy", "blend", "paint", "measurement"]),
+    (
+        "service",
+        &[
+            "studio",
+            "workshop",
+            "store",
+            "accuracy",
+            "blend",
+            "paint",
+            "measurement",
+        ],
+    ),
+    (
+        "cli",
+        &[
+            "workshop",
+            "service",
+            "accuracy",
+            "blend",
+            "paint",
+            "measurement",
+        ],
+    ),
 ];
 
 /// Rooms that compute and nothing else, and what would make them impure.
-const PURE: &[&str] = &["color", "transport", "paint", "measurement", "fit", "blend", "render", "export", "accuracy"];
-const IMPURE: &[&str] = &["tokio::", "axum::", "std::time::", "std::env::", "rand::rng", "thread_rng"];
+const PURE: &[&str] = &[
+    "color",
+    "transport",
+    "paint",
+    "measurement",
+    "fit",
+    "blend",
+    "render",
+    "export",
+    "accuracy",
+];
+const IMPURE: &[&str] = &[
+    "tokio::",
+    "axum::",
+    "std::time::",
+    "std::env::",
+    "rand::rng",
+    "thread_rng",
+];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a readable folder").flatten() {
@@ -55,13 +116,24 @@ fn room_files(room: &str) -> Vec<PathBuf> {
 /// The file without its tests: a test may use what it likes.
 fn code_of(path: &Path) -> String {
     let text = fs::read_to_string(path).expect("a readable source");
-    let code = text.split("#[cfg(test)]\nmod ").next().unwrap_or_default().to_owned();
+    let code = text
+        .split("#[cfg(test)]\nmod ")
+        .next()
+        .unwrap_or_default()
+        .to_owned();
     let is_comment = |line: &&str| !line.trim_start().starts_with("//");
-    code.lines().filter(is_comment).collect::<Vec<_>>().join("\n")
+    code.lines()
+        .filter(is_comment)
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 fn rooms_used(code: &str) -> BTreeSet<String> {
-    let name = |rest: &str| rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+    let name = |rest: &str| {
+        rest.chars()
+            .take_while(|c| c.is_alphanumeric() || *c == '_')
+            .collect::<String>()
+    };
     let mut used: BTreeSet<String> = code.split("crate::").skip(1).map(name).collect();
     // `use crate::{a::…, b::…}`
     for list in code.split("crate::{").skip(1) {
@@ -100,7 +172,11 @@ fn every_arrow_between_rooms_is_in_the_table() {
             }
         }
     }
-    assert!(wrong.is_empty(), "arrows the house does not have:\n{}", wrong.join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "arrows the house does not have:\n{}",
+        wrong.join("\n")
+    );
 }
 
 #[test]
@@ -109,7 +185,10 @@ fn every_room_is_in_the_table() {
     for entry in fs::read_dir(root).expect("src is readable").flatten() {
         if entry.path().is_dir() {
             let name = entry.file_name().into_string().expect("a plain name");
-            assert!(MAY_USE.iter().any(|(room, _)| *room == name), "room {name} is not in the table");
+            assert!(
+                MAY_USE.iter().any(|(room, _)| *room == name),
+                "room {name} is not in the table"
+            );
         }
     }
 }

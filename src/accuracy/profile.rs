@@ -48,8 +48,14 @@ impl Profile {
         let standard = Self::standard();
         Self {
             name: "draft".to_owned(),
-            flakes: ClusterSettings { clusters: 24, ..standard.flakes },
-            blend: BlendSettings { method: Method::Greedy, cost: Cost::Distance },
+            flakes: ClusterSettings {
+                clusters: 24,
+                ..standard.flakes
+            },
+            blend: BlendSettings {
+                method: Method::Greedy,
+                cost: Cost::Distance,
+            },
             samples_per_pixel: 16,
             ..standard
         }
@@ -60,8 +66,14 @@ impl Profile {
     pub fn standard() -> Self {
         Self {
             name: "standard".to_owned(),
-            flakes: ClusterSettings { clusters: 50, ..ClusterSettings::default() },
-            blend: BlendSettings { method: Method::Exact, cost: Cost::Distance },
+            flakes: ClusterSettings {
+                clusters: 50,
+                ..ClusterSettings::default()
+            },
+            blend: BlendSettings {
+                method: Method::Exact,
+                cost: Cost::Distance,
+            },
             export: ExportSettings::default(),
             samples_per_pixel: 64,
         }
@@ -73,8 +85,14 @@ impl Profile {
         let standard = Self::standard();
         Self {
             name: "reference".to_owned(),
-            flakes: ClusterSettings { clusters: 200, ..standard.flakes },
-            export: ExportSettings { precision: Precision::F32, ..standard.export },
+            flakes: ClusterSettings {
+                clusters: 200,
+                ..standard.flakes
+            },
+            export: ExportSettings {
+                precision: Precision::F32,
+                ..standard.export
+            },
             samples_per_pixel: 256,
             ..standard
         }
@@ -106,6 +124,13 @@ impl Profile {
         if clusters == self.flakes.clusters {
             return Ok(self);
         }
-        Ok(Self { name: "custom".to_owned(), flakes: ClusterSettings { clusters, ..self.flakes }, ..self })
+        Ok(Self {
+            name: "custom".to_owned(),
+            flakes: ClusterSettings {
+                clusters,
+                ..self.flakes
+            },
+            ..self
+        })
     }
 }

@@ -6,9 +6,15 @@ use crate::color::Lab;
 use crate::paint::{AngleGrid, CarPaint, Coat, ColorTable, Limits, MAX_LAB, MAX_WEIGHT};
 
 /// Angles of all the paints' color tables, each once.
-pub(super) fn common_table_grid(paints: &[&CarPaint]) -> Result<(AngleGrid, AngleGrid), BlendError> {
-    common_grid(paints.iter().map(|p| (p.color_table.theta_h(), p.color_table.theta_d())))
-        .map(|grid| grid.unwrap_or_else(|| (AngleGrid::single(), AngleGrid::single())))
+pub(super) fn common_table_grid(
+    paints: &[&CarPaint],
+) -> Result<(AngleGrid, AngleGrid), BlendError> {
+    common_grid(
+        paints
+            .iter()
+            .map(|p| (p.color_table.theta_h(), p.color_table.theta_d())),
+    )
+    .map(|grid| grid.unwrap_or_else(|| (AngleGrid::single(), AngleGrid::single())))
 }
 
 /// The union of several pairs of angle grids, `None` of none.
@@ -16,7 +22,10 @@ pub(super) fn common_grid<'a>(
     grids: impl Iterator<Item = (&'a AngleGrid, &'a AngleGrid)>,
 ) -> Result<Option<(AngleGrid, AngleGrid)>, BlendError> {
     let union = grids.fold(None, |union: Option<(AngleGrid, AngleGrid)>, (h, d)| {
-        Some(union.map_or_else(|| (h.clone(), d.clone()), |(uh, ud)| (uh.union(h), ud.union(d))))
+        Some(union.map_or_else(
+            || (h.clone(), d.clone()),
+            |(uh, ud)| (uh.union(h), ud.union(d)),
+        ))
     });
     let accepted = Limits::default().angles * super::PAINTS.end();
     match union.as_ref().map(|(h, d)| h.len().max(d.len())) {
@@ -29,30 +38,52 @@ pub(super) fn common_grid<'a>(
 pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> Option<Coat> {
     let first = paints.iter().find_map(|p| p.coat)?;
     let of = |paint: &BlendedPaint| paint.coat.unwrap_or(Coat { ior: 1.0, ..first });
-    let mix = |get: &dyn Fn(Coat) -> f64| paints.iter().zip(weights).map(|(p, w)| w * get(of(p))).sum::<f64>();
+    let mix = |get: &dyn Fn(Coat) -> f64| {
+        paints
+            .iter()
+            .zip(weights)
+            .map(|(p, w)| w * get(of(p)))
+            .sum::<f64>()
+    };
     let ior = ledger.hold("coat.ior", mix(&|c| c.ior), 1.0, 4.0);
     if ior == 1.0 {
         return None;
     }
-    let thick = paints.iter().all(|p| p.coat.is_none_or(|c| c.thickness_um.is_some()));
+    let thick = paints
+        .iter()
+        .all(|p| p.coat.is_none_or(|c| c.thickness_um.is_some()));
     Some(Coat {
         ior,
         roughness: ledger.hold("coat.roughness", mix(&|c| c.roughness), 0.0, 1.0),
-        thickness_um: thick
-            .then(|| ledger.hold("coat.thickness_um", mix(&|c| c.thickness_um.unwrap_or(0.0)), 0.0, 1e6)),
+        thickness_um: thick.then(|| {
+            ledger.hold(
+                "coat.thickness_um",
+                mix(&|c| c.thickness_um.unwrap_or(0.0)),
+                0.0,
+                1e6,
+            )
+        }),
     })
 }
 
 /// Diffuse albedo blends linearly.
 pub(super) fn diffuse(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> [f64; 3] {
     std::array::from_fn(|c| {
-        let value = paints.iter().zip(weights).map(|(p, w)| w * p.diffuse[c]).sum();
+        let value = paints
+            .iter()
+            .zip(weights)
+            .map(|(p, w)| w * p.diffuse[c])
+            .sum();
         ledger.hold("diffuse", value, 0.0, MAX_WEIGHT)
     })
 }
 
 /// Color tables blend in CIELAB, node by node (Golla and Klein 2018, 4.2).
-pub(super) fn color_table(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> ColorTable {
+pub(super) fn color_table(
+    paints: &[BlendedPaint],
+    weights: &[f64],
+    ledger: &mut Ledger,
+) -> ColorTable {
     let first = &paints[0].color_table;
     let (mut held, mut worst) = (0, 0.0_f64);
     let mut mix = |get: &dyn Fn(&ColorTable) -> Lab| {
@@ -73,9 +104,22 @@ pub(super) fn color_table(paints: &[BlendedPaint], weights: &[f64], ledger: &mut
         }
         Lab::from(sum)
     };
-    let nodes: Vec<Lab> = (0..first.nodes().len()).map(|k| mix(&|t| t.nodes()[k])).collect();
+    let nodes: Vec<Lab> = (0..first.nodes().len())
+        .map(|k| mix(&|t| t.nodes()[k]))
+        .collect();
     let overall = mix(&|t| t.overall());
-    ledger.record("color_table", "Lab held to -2000..2000", held, 3 * (nodes.len() + 1), worst);
-    ColorTable::new(first.theta_h().clone(), first.theta_d().clone(), nodes, overall)
-        .expect("one finite color per node of the common grid")
+    ledger.record(
+        "color_table",
+        "Lab held to -2000..2000",
+        held,
+        3 * (nodes.len() + 1),
+        worst,
+    );
+    ColorTable::new(
+        first.theta_h().clone(),
+        first.theta_d().clone(),
+        nodes,
+        overall,
+    )
+    .expect("one finite color per node of the common grid")
 }

@@ -65,7 +65,10 @@ pub(super) fn correspond(
     settings: &BlendSettings,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<(Option<BlendedFlakes>, CorrespondenceReport), BlendError> {
-    let grids = paints.iter().filter_map(|p| p.flakes.as_ref()).map(|f| (&f.theta_h, &f.theta_d));
+    let grids = paints
+        .iter()
+        .filter_map(|p| p.flakes.as_ref())
+        .map(|f| (&f.theta_h, &f.theta_d));
     let Some((theta_h, theta_d)) = common_grid(grids)? else {
         return Ok((None, CorrespondenceReport::default()));
     };
@@ -74,11 +77,16 @@ pub(super) fn correspond(
     let slices: Vec<SliceBlend> = (0..count)
         .into_par_iter()
         .map_init(Bench::default, |bench, k| {
-            let (h, d) = (theta_h.degrees()[k / theta_d.len()], theta_d.degrees()[k % theta_d.len()]);
-            let slice = blend_slice(paints, h, d, settings, bench).map_err(|source| BlendError::Transport {
-                theta_h_deg: h,
-                theta_d_deg: d,
-                source,
+            let (h, d) = (
+                theta_h.degrees()[k / theta_d.len()],
+                theta_d.degrees()[k % theta_d.len()],
+            );
+            let slice = blend_slice(paints, h, d, settings, bench).map_err(|source| {
+                BlendError::Transport {
+                    theta_h_deg: h,
+                    theta_d_deg: d,
+                    source,
+                }
             });
             let so_far = done.fetch_add(1, Ordering::Relaxed) + 1;
             if so_far.is_multiple_of(64) || so_far == count {
@@ -90,12 +98,19 @@ pub(super) fn correspond(
         .collect::<Result<_, _>>()?;
 
     let total: usize = slices.iter().map(|s| s.probability.len()).sum();
-    let with_room = || Boxes { lower: Vec::with_capacity(total), upper: Vec::with_capacity(total) };
+    let with_room = || Boxes {
+        lower: Vec::with_capacity(total),
+        upper: Vec::with_capacity(total),
+    };
     let mut offsets = Vec::with_capacity(count + 1);
     offsets.push(0);
     let mut probability = Vec::with_capacity(total);
     let mut boxes: Vec<Boxes> = paints.iter().map(|_| with_room()).collect();
-    let mut report = CorrespondenceReport { slices: count, clusters: total, ..Default::default() };
+    let mut report = CorrespondenceReport {
+        slices: count,
+        clusters: total,
+        ..Default::default()
+    };
     for slice in slices {
         probability.extend_from_slice(&slice.probability);
         for (all, own) in boxes.iter_mut().zip(&slice.boxes) {
@@ -117,13 +132,25 @@ pub(super) fn correspond(
         }
     }
     let textures = textures(paints);
-    Ok((Some(BlendedFlakes { theta_h, theta_d, offsets, probability, boxes, textures }), report))
+    Ok((
+        Some(BlendedFlakes {
+            theta_h,
+            theta_d,
+            offsets,
+            probability,
+            boxes,
+            textures,
+        }),
+        report,
+    ))
 }
 
 /// Grain and lifetime of each paint; one without flakes has those of the first that has.
 fn textures(paints: &[&CarPaint]) -> Vec<FlakeTexture> {
     let own = |p: &&CarPaint| p.flakes.as_ref().map(|f| f.texture);
-    let Some(first) = paints.iter().find_map(own) else { return Vec::new() };
+    let Some(first) = paints.iter().find_map(own) else {
+        return Vec::new();
+    };
     paints.iter().map(|p| own(p).unwrap_or(first)).collect()
 }
 
@@ -134,7 +161,12 @@ fn blend_slice(
     settings: &BlendSettings,
     bench: &mut Bench,
 ) -> Result<SliceBlend, TransportError> {
-    clusters_at(paints[0].flakes.as_ref(), theta_h_deg, theta_d_deg, &mut bench.clusters);
+    clusters_at(
+        paints[0].flakes.as_ref(),
+        theta_h_deg,
+        theta_d_deg,
+        &mut bench.clusters,
+    );
     let mut slice = SliceBlend {
         probability: bench.clusters.iter().map(|c| c.probability).collect(),
         boxes: vec![bench.clusters.iter().map(|c| (c.lower, c.upper)).collect()],
@@ -142,11 +174,22 @@ fn blend_slice(
         gap: 0.0,
     };
     for paint in &paints[1..] {
-        clusters_at(paint.flakes.as_ref(), theta_h_deg, theta_d_deg, &mut bench.clusters);
-        let source = (0..slice.probability.len()).map(|k| (slice.even_center(k), slice.probability[k]));
+        clusters_at(
+            paint.flakes.as_ref(),
+            theta_h_deg,
+            theta_d_deg,
+            &mut bench.clusters,
+        );
+        let source =
+            (0..slice.probability.len()).map(|k| (slice.even_center(k), slice.probability[k]));
         let target = bench.clusters.iter().map(|c| (c.center(), c.probability));
         bench.problem.refill(source, target)?;
-        settings.method.solve_into(&bench.problem, settings.cost, &mut bench.workspace, &mut bench.plan)?;
+        settings.method.solve_into(
+            &bench.problem,
+            settings.cost,
+            &mut bench.workspace,
+            &mut bench.plan,
+        )?;
         slice.join(&bench.plan, &bench.clusters);
     }
     slice.sort_by_lightness();
@@ -159,7 +202,8 @@ impl SliceBlend {
         #[allow(clippy::cast_precision_loss)] // at most five paints
         let twice = 2.0 * self.boxes.len() as f64;
         std::array::from_fn(|axis| {
-            let corner = |b: &Vec<([f32; 3], [f32; 3])>| f64::from(b[k].0[axis]) + f64::from(b[k].1[axis]);
+            let corner =
+                |b: &Vec<([f32; 3], [f32; 3])>| f64::from(b[k].0[axis]) + f64::from(b[k].1[axis]);
             self.boxes.iter().map(corner).sum::<f64>() / twice
         })
     }
@@ -169,14 +213,21 @@ impl SliceBlend {
         for own in &mut self.boxes {
             *own = plan.entries.iter().map(|e| own[e.source]).collect();
         }
-        self.boxes.push(plan.entries.iter().map(|e| (target[e.target].lower, target[e.target].upper)).collect());
+        self.boxes.push(
+            plan.entries
+                .iter()
+                .map(|e| (target[e.target].lower, target[e.target].upper))
+                .collect(),
+        );
         self.probability = plan.entries.iter().map(|e| e.mass).collect();
         self.cost += plan.cost;
         self.gap = self.gap.max(plan.gap);
     }
 
     fn sort_by_lightness(&mut self) {
-        let lightness: Vec<f64> = (0..self.probability.len()).map(|k| self.even_center(k)[0]).collect();
+        let lightness: Vec<f64> = (0..self.probability.len())
+            .map(|k| self.even_center(k)[0])
+            .collect();
         let mut order: Vec<usize> = (0..lightness.len()).collect();
         order.sort_by(|&x, &y| lightness[x].total_cmp(&lightness[y]));
         self.probability = order.iter().map(|&k| self.probability[k]).collect();

@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Blend, BlendSettings, BlendedFlakes, BlendedPaint, Boxes, CorrespondenceReport, PAINTS};
+use super::{
+    Blend, BlendSettings, BlendedFlakes, BlendedPaint, Boxes, CorrespondenceReport, PAINTS,
+};
 use crate::color::{Lab, LinearRgb};
 use crate::paint::{
-    AngleGrid, CarPaint, Coat, ColorTable, Container, ContainerError, FlakeTexture, Flakes, Limits, Lobe, PaintError,
-    Reader, Writer,
+    AngleGrid, CarPaint, Coat, ColorTable, Container, ContainerError, FlakeTexture, Flakes, Limits,
+    Lobe, PaintError, Reader, Writer,
 };
 
 /// Latest version of the file that is read and the one that is written.
@@ -72,7 +74,12 @@ impl Blend {
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut writer = Writer::default();
         for paint in &self.paints {
-            let nodes: Vec<[f64; 3]> = paint.color_table.nodes().iter().map(|lab| lab.to_array()).collect();
+            let nodes: Vec<[f64; 3]> = paint
+                .color_table
+                .nodes()
+                .iter()
+                .map(|lab| lab.to_array())
+                .collect();
             writer.array(&nodes);
         }
         if let Some(flakes) = &self.flakes {
@@ -117,18 +124,38 @@ impl Blend {
         }
         let mut paints = Vec::with_capacity(count);
         for (place, paint) in header.paints.into_iter().enumerate() {
-            let nodes = reader.array::<[f64; 3]>()?.into_iter().map(Lab::from).collect();
-            let (h, d) = (header.chi_theta_h_deg.clone(), header.chi_theta_d_deg.clone());
-            let color_table = ColorTable::new(h, d, nodes, paint.chi_overall)
-                .map_err(|source| BlendFileError::Paint { place, source: source.into() })?;
+            let nodes = reader
+                .array::<[f64; 3]>()?
+                .into_iter()
+                .map(Lab::from)
+                .collect();
+            let (h, d) = (
+                header.chi_theta_h_deg.clone(),
+                header.chi_theta_d_deg.clone(),
+            );
+            let color_table =
+                ColorTable::new(h, d, nodes, paint.chi_overall).map_err(|source| {
+                    BlendFileError::Paint {
+                        place,
+                        source: source.into(),
+                    }
+                })?;
             paints.push(paint.with(color_table));
         }
         let flakes = match header.flakes {
             None => None,
-            Some(flakes) if flakes.textures.len() != count => return shape("not one flake texture a paint"),
+            Some(flakes) if flakes.textures.len() != count => {
+                return shape("not one flake texture a paint");
+            }
             Some(flakes) => Some(read_flakes(flakes, count, &mut reader)?),
         };
-        let blend = Self { paints, asked: header.asked, flakes, settings: header.settings, report: header.report };
+        let blend = Self {
+            paints,
+            asked: header.asked,
+            flakes,
+            settings: header.settings,
+            report: header.report,
+        };
         blend.validate(limits)?;
         Ok(blend)
     }
@@ -136,7 +163,11 @@ impl Blend {
     /// Validates each paint as it stands alone: its own boxes with the common probabilities.
     fn validate(&self, limits: &Limits) -> Result<(), BlendFileError> {
         // Corresponding clusters of k paints are at most the sum of theirs, four slices each where grids differ.
-        let limits = Limits { clusters: limits.clusters * 4 * self.paints.len(), angles: usize::MAX, ..*limits };
+        let limits = Limits {
+            clusters: limits.clusters * 4 * self.paints.len(),
+            angles: usize::MAX,
+            ..*limits
+        };
         for (place, paint) in self.paints.iter().enumerate() {
             let flakes = self.flakes.as_ref().map(|f| Flakes {
                 theta_h: f.theta_h.clone(),
@@ -154,20 +185,40 @@ impl Blend {
                 color_table: paint.color_table.clone(),
                 flakes,
             };
-            alone.validate(&limits).map_err(|source| BlendFileError::Paint { place, source })?;
+            alone
+                .validate(&limits)
+                .map_err(|source| BlendFileError::Paint { place, source })?;
         }
         Ok(())
     }
 }
 
-fn read_flakes(header: FlakeHeader, paints: usize, reader: &mut Reader<'_>) -> Result<BlendedFlakes, ContainerError> {
+fn read_flakes(
+    header: FlakeHeader,
+    paints: usize,
+    reader: &mut Reader<'_>,
+) -> Result<BlendedFlakes, ContainerError> {
     let (offsets, probability) = (reader.array()?, reader.array()?);
     let mut boxes = Vec::with_capacity(paints);
     for _ in 0..paints {
-        boxes.push(Boxes { lower: reader.array()?, upper: reader.array()? });
+        boxes.push(Boxes {
+            lower: reader.array()?,
+            upper: reader.array()?,
+        });
     }
-    let FlakeHeader { theta_h_deg: theta_h, theta_d_deg: theta_d, textures } = header;
-    Ok(BlendedFlakes { theta_h, theta_d, offsets, probability, boxes, textures })
+    let FlakeHeader {
+        theta_h_deg: theta_h,
+        theta_d_deg: theta_d,
+        textures,
+    } = header;
+    Ok(BlendedFlakes {
+        theta_h,
+        theta_d,
+        offsets,
+        probability,
+        boxes,
+        textures,
+    })
 }
 
 impl PaintHeader {
@@ -183,7 +234,21 @@ impl PaintHeader {
     }
 
     fn with(self, color_table: ColorTable) -> BlendedPaint {
-        let Self { name, hash, coat, diffuse, lobes, .. } = self;
-        BlendedPaint { name, hash, coat, diffuse, lobes, color_table }
+        let Self {
+            name,
+            hash,
+            coat,
+            diffuse,
+            lobes,
+            ..
+        } = self;
+        BlendedPaint {
+            name,
+            hash,
+            coat,
+            diffuse,
+            lobes,
+            color_table,
+        }
     }
 }

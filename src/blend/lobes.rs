@@ -16,28 +16,48 @@ pub(super) fn matched(lobes: &[&[Lobe]]) -> Vec<Vec<Lobe>> {
     let active: Vec<Vec<Lobe>> = lobes
         .iter()
         .map(|list| {
-            let mut active: Vec<Lobe> = list.iter().copied().filter(|lobe| !lobe.is_absent()).collect();
+            let mut active: Vec<Lobe> = list
+                .iter()
+                .copied()
+                .filter(|lobe| !lobe.is_absent())
+                .collect();
             active.sort_by(|x, y| x.alpha.total_cmp(&y.alpha));
             active
         })
         .collect();
     let places = active.iter().map(Vec::len).max().unwrap_or(0);
-    let Some(reference) = active.iter().find(|list| list.len() == places) else { return Vec::new() };
+    let Some(reference) = active.iter().find(|list| list.len() == places) else {
+        return Vec::new();
+    };
     let reference: Vec<f64> = reference.iter().map(|lobe| lobe.alpha).collect();
     let seats: Vec<Vec<usize>> = active.iter().map(|list| seats(list, &reference)).collect();
     (0..places)
         .map(|place| {
-            let here = |paint: usize| seats[paint].iter().position(|&s| s == place).map(|k| active[paint][k]);
+            let here = |paint: usize| {
+                seats[paint]
+                    .iter()
+                    .position(|&s| s == place)
+                    .map(|k| active[paint][k])
+            };
             let present: Vec<Lobe> = (0..lobes.len()).filter_map(here).collect();
             #[allow(clippy::cast_precision_loss)] // at most five paints
             let count = present.len() as f64;
             let alpha = (present.iter().map(|lobe| lobe.alpha.ln()).sum::<f64>() / count).exp();
             let f0 = present.iter().map(|lobe| lobe.f0).sum::<f64>() / count;
             let stand_in = match present.as_slice() {
-                [only] => Lobe { weight: [0.0; 3], ..*only },
-                _ => Lobe { weight: [0.0; 3], alpha, f0 },
+                [only] => Lobe {
+                    weight: [0.0; 3],
+                    ..*only
+                },
+                _ => Lobe {
+                    weight: [0.0; 3],
+                    alpha,
+                    f0,
+                },
             };
-            (0..lobes.len()).map(|paint| here(paint).unwrap_or(stand_in)).collect()
+            (0..lobes.len())
+                .map(|paint| here(paint).unwrap_or(stand_in))
+                .collect()
         })
         .collect()
 }
@@ -45,13 +65,16 @@ pub(super) fn matched(lobes: &[&[Lobe]]) -> Vec<Vec<Lobe>> {
 /// Places of a paint's lobes among the reference's, in order, of least total `|Δ ln α|`.
 fn seats(lobes: &[Lobe], reference: &[f64]) -> Vec<usize> {
     let (n, m) = (lobes.len(), reference.len());
-    let distance = |k: usize, place: usize| (lobes[k].alpha.max(1e-300).ln() - reference[place].max(1e-300).ln()).abs();
+    let distance = |k: usize, place: usize| {
+        (lobes[k].alpha.max(1e-300).ln() - reference[place].max(1e-300).ln()).abs()
+    };
     // best[k][p]: least cost of seating the first k lobes among the first p places.
     let mut best = vec![vec![f64::INFINITY; m + 1]; n + 1];
     best[0] = vec![0.0; m + 1];
     for k in 1..=n {
         for place in k..=m {
-            best[k][place] = (best[k - 1][place - 1] + distance(k - 1, place - 1)).min(best[k][place - 1]);
+            best[k][place] =
+                (best[k - 1][place - 1] + distance(k - 1, place - 1)).min(best[k][place - 1]);
         }
     }
     let (mut seats, mut place) = (vec![0; n], m);
@@ -75,10 +98,15 @@ pub(super) fn blend(places: &[Vec<Lobe>], weights: &[f64], ledger: &mut Ledger) 
         .iter()
         .map(|lobes| {
             let pairs = || lobes.iter().zip(weights);
-            let alpha = pairs().map(|(lobe, &w)| lobe.alpha.powf(share(w))).product::<f64>();
+            let alpha = pairs()
+                .map(|(lobe, &w)| lobe.alpha.powf(share(w)))
+                .product::<f64>();
             // Far extrapolation can give 0 · ∞; the logarithm's sum still knows which of the two it is.
             let alpha = if alpha.is_nan() {
-                pairs().map(|(lobe, &w)| share(w) * lobe.alpha.ln()).sum::<f64>().exp()
+                pairs()
+                    .map(|(lobe, &w)| share(w) * lobe.alpha.ln())
+                    .sum::<f64>()
+                    .exp()
             } else {
                 alpha
             };
@@ -89,7 +117,12 @@ pub(super) fn blend(places: &[Vec<Lobe>], weights: &[f64], ledger: &mut Ledger) 
                     ledger.hold("lobes.weight", s, 0.0, MAX_WEIGHT)
                 }),
                 alpha: ledger.hold("lobes.alpha", alpha, MIN_ALPHA, MAX_ALPHA),
-                f0: ledger.hold("lobes.f0", pairs().map(|(lobe, w)| w * lobe.f0).sum(), 0.0, 1.0),
+                f0: ledger.hold(
+                    "lobes.f0",
+                    pairs().map(|(lobe, w)| w * lobe.f0).sum(),
+                    0.0,
+                    1.0,
+                ),
             }
         })
         .collect()
@@ -100,17 +133,27 @@ mod tests {
     use super::*;
 
     fn lobe(alpha: f64, s: f64) -> Lobe {
-        Lobe { weight: [s; 3], alpha, f0: 0.5 }
+        Lobe {
+            weight: [s; 3],
+            alpha,
+            f0: 0.5,
+        }
     }
 
     #[test]
     fn a_single_lobe_takes_the_place_of_its_own_width() {
-        let (white, metallic) = ([lobe(0.3, 0.02), lobe(0.2, 0.0)], [lobe(0.1, 1.0), lobe(0.42, 2.0), lobe(0.25, 3.0)]);
+        let (white, metallic) = (
+            [lobe(0.3, 0.02), lobe(0.2, 0.0)],
+            [lobe(0.1, 1.0), lobe(0.42, 2.0), lobe(0.25, 3.0)],
+        );
         let places = matched(&[&white, &metallic]);
         let first: Vec<f64> = places.iter().map(|p| p[0].weight[0]).collect();
         assert_eq!(first, [0.0, 0.02, 0.0]);
         assert_eq!(places[0][0].alpha, 0.1);
-        assert_eq!(places[1].iter().map(|l| l.alpha).collect::<Vec<_>>(), [0.3, 0.25]);
+        assert_eq!(
+            places[1].iter().map(|l| l.alpha).collect::<Vec<_>>(),
+            [0.3, 0.25]
+        );
     }
 
     #[test]
@@ -121,7 +164,10 @@ mod tests {
         assert!((half[0].alpha - 0.2).abs() < 1e-15);
         assert_eq!(half[0].weight, [2.0; 3]);
         assert!(ledger.close().is_empty());
-        assert_eq!(blend(&places, &[1.0, 0.0], &mut Ledger::default()), [lobe(0.1, 1.0)]);
+        assert_eq!(
+            blend(&places, &[1.0, 0.0], &mut Ledger::default()),
+            [lobe(0.1, 1.0)]
+        );
     }
 
     #[test]

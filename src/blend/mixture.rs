@@ -16,7 +16,11 @@ pub(super) struct Cluster {
 
 impl Cluster {
     /// Everything black, in one cluster: a paint without flakes.
-    pub const BLACK: Self = Self { probability: 1.0, lower: [0.0; 3], upper: [0.0; 3] };
+    pub const BLACK: Self = Self {
+        probability: 1.0,
+        lower: [0.0; 3],
+        upper: [0.0; 3],
+    };
 
     pub fn center(&self) -> [f64; 3] {
         std::array::from_fn(|k| f64::midpoint(f64::from(self.lower[k]), f64::from(self.upper[k])))
@@ -24,13 +28,21 @@ impl Cluster {
 }
 
 /// Fills `out` with the clusters at an angle pair in degrees; those of probability 0 are left out.
-pub(super) fn clusters_at(flakes: Option<&Flakes>, theta_h_deg: f64, theta_d_deg: f64, out: &mut Vec<Cluster>) {
+pub(super) fn clusters_at(
+    flakes: Option<&Flakes>,
+    theta_h_deg: f64,
+    theta_d_deg: f64,
+    out: &mut Vec<Cluster>,
+) {
     out.clear();
     let Some(flakes) = flakes else {
         out.push(Cluster::BLACK);
         return;
     };
-    let (row, column) = (flakes.theta_h.bracket(theta_h_deg), flakes.theta_d.bracket(theta_d_deg));
+    let (row, column) = (
+        flakes.theta_h.bracket(theta_h_deg),
+        flakes.theta_d.bracket(theta_d_deg),
+    );
     let ends = |b: Bracket| [(b.low, 1.0 - b.fraction), (b.high, b.fraction)];
     let mut parts = 0;
     for (h, weight_h) in ends(row) {
@@ -41,9 +53,14 @@ pub(super) fn clusters_at(flakes: Option<&Flakes>, theta_h_deg: f64, theta_d_deg
             }
             parts += 1;
             let slice = flakes.slice(h, d);
-            for ((&p, &lower), &upper) in slice.probability.iter().zip(slice.lower).zip(slice.upper) {
+            for ((&p, &lower), &upper) in slice.probability.iter().zip(slice.lower).zip(slice.upper)
+            {
                 if p * weight > 0.0 {
-                    out.push(Cluster { probability: p * weight, lower, upper });
+                    out.push(Cluster {
+                        probability: p * weight,
+                        lower,
+                        upper,
+                    });
                 }
             }
         }

@@ -92,7 +92,9 @@ pub enum BlendError {
     #[error("{0} paints given, a blend takes 2 to 5")]
     Paints(usize),
     /// More angles than are accepted on the common grid.
-    #[error("the common grid of these paints has {angles} angles on an axis, accepted are {accepted}")]
+    #[error(
+        "the common grid of these paints has {angles} angles on an axis, accepted are {accepted}"
+    )]
     Angles {
         /// Angles of the longer axis.
         angles: usize,
@@ -126,7 +128,10 @@ impl Blend {
         if !PAINTS.contains(&ingredients.len()) {
             return Err(BlendError::Paints(ingredients.len()));
         }
-        let hashes: Vec<String> = ingredients.iter().map(|i| i.paint.content_hash().to_hex().to_string()).collect();
+        let hashes: Vec<String> = ingredients
+            .iter()
+            .map(|i| i.paint.content_hash().to_hex().to_string())
+            .collect();
         let mut canonical: Vec<usize> = (0..ingredients.len()).collect();
         canonical.sort_by(|&a, &b| hashes[a].cmp(&hashes[b]));
         let mut asked = vec![0; ingredients.len()];
@@ -150,7 +155,13 @@ impl Blend {
                 }
             })
             .collect();
-        Ok(Self { paints, asked, flakes, settings: *settings, report })
+        Ok(Self {
+            paints,
+            asked,
+            flakes,
+            settings: *settings,
+            report,
+        })
     }
 
     /// How many paints, which is how many weights a realisation takes.
@@ -172,12 +183,17 @@ impl Blend {
     /// When `order` names a paint that is not there.
     #[must_use]
     pub fn in_order(self, order: &[usize]) -> Self {
-        Self { asked: order.iter().map(|&k| self.asked[k]).collect(), ..self }
+        Self {
+            asked: order.iter().map(|&k| self.asked[k]).collect(),
+            ..self
+        }
     }
 
     /// Name and content hash of each paint, in the order asked for.
     pub fn ingredients(&self) -> impl Iterator<Item = (&str, &str)> + Clone {
-        self.asked.iter().map(|&k| (self.paints[k].name.as_str(), self.paints[k].hash.as_str()))
+        self.asked
+            .iter()
+            .map(|&k| (self.paints[k].name.as_str(), self.paints[k].hash.as_str()))
     }
 
     /// How the correspondence was found and how good it is.

@@ -49,25 +49,47 @@ impl Blend {
         let lightness = by_hash(wanted.flake_lightness());
         let color = by_hash(wanted.flake_color());
         let mut ledger = Ledger::default();
-        let places = lobes::matched(&self.paints.iter().map(|p| p.lobes.as_slice()).collect::<Vec<_>>());
+        let places = lobes::matched(
+            &self
+                .paints
+                .iter()
+                .map(|p| p.lobes.as_slice())
+                .collect::<Vec<_>>(),
+        );
         let paint = CarPaint {
             coat: base::coat(&self.paints, &base_weights, &mut ledger),
             diffuse: base::diffuse(&self.paints, &base_weights, &mut ledger),
             lobes: lobes::blend(&places, &base_weights, &mut ledger),
             color_table: base::color_table(&self.paints, &base_weights, &mut ledger),
-            flakes: self.flakes.as_ref().map(|f| f.blend(&lightness, &color, wanted.flake_saturation, &mut ledger)),
+            flakes: self
+                .flakes
+                .as_ref()
+                .map(|f| f.blend(&lightness, &color, wanted.flake_saturation, &mut ledger)),
         };
         let weight_sums = [&base_weights, &lightness, &color].map(|w| w.iter().sum());
-        Ok(Realised { paint, clamps: ledger.close(), weight_sums })
+        Ok(Realised {
+            paint,
+            clamps: ledger.close(),
+            weight_sums,
+        })
     }
 }
 
 impl BlendedFlakes {
     /// The flakes at these weights, in the paints' order.
-    fn blend(&self, lightness: &[f64], color: &[f64], saturation: f64, ledger: &mut Ledger) -> Flakes {
+    fn blend(
+        &self,
+        lightness: &[f64],
+        color: &[f64],
+        saturation: f64,
+        ledger: &mut Ledger,
+    ) -> Flakes {
         let count = self.probability.len();
-        let axes: Vec<[f64; 3]> =
-            lightness.iter().zip(color).map(|(&l, &c)| [l, c * saturation, c * saturation]).collect();
+        let axes: Vec<[f64; 3]> = lightness
+            .iter()
+            .zip(color)
+            .map(|(&l, &c)| [l, c * saturation, c * saturation])
+            .collect();
         let (mut lower, mut upper) = (Vec::with_capacity(count), Vec::with_capacity(count));
         let (mut inverted, mut narrowest) = (0, 0.0_f64);
         let (mut beyond, mut furthest) = (0, 0.0_f64);
@@ -91,8 +113,20 @@ impl BlendedFlakes {
             lower.push(low.map(held));
             upper.push(high.map(held));
         }
-        ledger.record("flakes.boxes", "inverted corners put in order", inverted, 3 * count, -narrowest);
-        ledger.record("flakes.boxes", "Lab held to -2000..2000", beyond, 3 * count, furthest);
+        ledger.record(
+            "flakes.boxes",
+            "inverted corners put in order",
+            inverted,
+            3 * count,
+            -narrowest,
+        );
+        ledger.record(
+            "flakes.boxes",
+            "Lab held to -2000..2000",
+            beyond,
+            3 * count,
+            furthest,
+        );
         Flakes {
             theta_h: self.theta_h.clone(),
             theta_d: self.theta_d.clone(),
@@ -107,9 +141,15 @@ impl BlendedFlakes {
     /// Texel, grain and lifetime follow the weights of the lightness: they are how the sparkle looks.
     fn texture(&self, weights: &[f64], ledger: &mut Ledger) -> FlakeTexture {
         let mix = |get: &dyn Fn(&FlakeTexture) -> f64| -> f64 {
-            self.textures.iter().zip(weights).map(|(t, w)| w * get(t)).sum()
+            self.textures
+                .iter()
+                .zip(weights)
+                .map(|(t, w)| w * get(t))
+                .sum()
         };
-        let mut angle = |field: &str, get: &dyn Fn(&FlakeTexture) -> f64| ledger.hold(field, mix(get), 0.01, 1e4);
+        let mut angle = |field: &str, get: &dyn Fn(&FlakeTexture) -> f64| {
+            ledger.hold(field, mix(get), 0.01, 1e4)
+        };
         let lifetime_deg = [
             angle("flakes.lifetime_deg", &|t| t.lifetime_deg[0]),
             angle("flakes.lifetime_deg", &|t| t.lifetime_deg[1]),

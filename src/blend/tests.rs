@@ -34,17 +34,30 @@ fn paint(seed: u32, theta_h: &[f64], theta_d: &[f64]) -> CarPaint {
         let masses: Vec<f64> = (0..7).map(|_| 0.05 + next()).collect();
         let sum: f64 = masses.iter().sum();
         for mass in masses {
-            let corner: [f32; 3] =
-                [(60.0 * next()) as f32, (40.0 * next() - 20.0) as f32, (40.0 * next() - 20.0) as f32];
+            let corner: [f32; 3] = [
+                (60.0 * next()) as f32,
+                (40.0 * next() - 20.0) as f32,
+                (40.0 * next() - 20.0) as f32,
+            ];
             flakes.probability.push(mass / sum);
             flakes.lower.push(corner);
             flakes.upper.push(corner.map(|c| c + (9.0 * next()) as f32));
         }
         flakes.offsets.push(flakes.probability.len() as u32);
     }
-    let nodes = (0..4).map(|_| Lab { l: 40.0 + 50.0 * next(), a: 30.0 * next(), b: -30.0 * next() }).collect();
+    let nodes = (0..4)
+        .map(|_| Lab {
+            l: 40.0 + 50.0 * next(),
+            a: 30.0 * next(),
+            b: -30.0 * next(),
+        })
+        .collect();
     CarPaint {
-        coat: (!seed.is_multiple_of(3)).then(|| Coat { ior: 1.4 + 0.2 * next(), roughness: 0.02, thickness_um: None }),
+        coat: (!seed.is_multiple_of(3)).then(|| Coat {
+            ior: 1.4 + 0.2 * next(),
+            roughness: 0.02,
+            thickness_um: None,
+        }),
         diffuse: [next(), next(), next()],
         lobes: (0..3)
             .map(|k| Lobe {
@@ -53,8 +66,17 @@ fn paint(seed: u32, theta_h: &[f64], theta_d: &[f64]) -> CarPaint {
                 f0: next(),
             })
             .collect(),
-        color_table: ColorTable::new(grid(&[0.0, 50.0]), grid(&[0.0, 40.0]), nodes, Lab { l: 70.0, a: 0.0, b: 0.0 })
-            .expect("fits"),
+        color_table: ColorTable::new(
+            grid(&[0.0, 50.0]),
+            grid(&[0.0, 40.0]),
+            nodes,
+            Lab {
+                l: 70.0,
+                a: 0.0,
+                b: 0.0,
+            },
+        )
+        .expect("fits"),
         flakes: Some(flakes),
     }
 }
@@ -64,14 +86,22 @@ const D: &[f64] = &[0.0, 25.0];
 
 fn blend(paints: &[&CarPaint]) -> Blend {
     let names = ["first", "second", "third", "fourth", "fifth"];
-    let ingredients: Vec<Ingredient<'_>> =
-        paints.iter().zip(names).map(|(paint, name)| Ingredient { name, paint }).collect();
+    let ingredients: Vec<Ingredient<'_>> = paints
+        .iter()
+        .zip(names)
+        .map(|(paint, name)| Ingredient { name, paint })
+        .collect();
     Blend::new(&ingredients, &BlendSettings::default(), &|_| ()).expect("blends")
 }
 
 fn at(blend: &Blend, weights: &[f64]) -> CarPaint {
-    let realised = blend.realise(&RealisationWeights::even(weights.to_vec())).expect("weights fit");
-    realised.paint.validate(&Limits::default()).expect("a realisation is a valid paint");
+    let realised = blend
+        .realise(&RealisationWeights::even(weights.to_vec()))
+        .expect("weights fit");
+    realised
+        .paint
+        .validate(&Limits::default())
+        .expect("a realisation is a valid paint");
     realised.paint
 }
 
@@ -80,7 +110,10 @@ fn distribution(flakes: &Flakes, slice: usize) -> Vec<([u32; 6], f64)> {
     let slice = flakes.slice_at(slice);
     let mut boxes: Vec<([u32; 6], f64)> = Vec::new();
     for k in 0..slice.probability.len() {
-        let (l, u) = (slice.lower[k].map(|v| (v + 0.0).to_bits()), slice.upper[k].map(|v| (v + 0.0).to_bits()));
+        let (l, u) = (
+            slice.lower[k].map(|v| (v + 0.0).to_bits()),
+            slice.upper[k].map(|v| (v + 0.0).to_bits()),
+        );
         boxes.push(([l[0], l[1], l[2], u[0], u[1], u[2]], slice.probability[k]));
     }
     boxes.sort_by_key(|b| b.0);
@@ -125,7 +158,10 @@ fn at_weight_one_a_blend_is_that_paint() {
             assert_eq!(paint.diffuse, original.diffuse);
             assert_eq!(paint.lobes, active(&original.lobes));
             assert_eq!(paint.color_table, original.color_table);
-            let (got, want) = (paint.flakes.expect("has flakes"), original.flakes.as_ref().expect("has flakes"));
+            let (got, want) = (
+                paint.flakes.expect("has flakes"),
+                original.flakes.as_ref().expect("has flakes"),
+            );
             assert_eq!(got.texture, want.texture);
             same_distributions(&got, want);
         }
@@ -149,8 +185,15 @@ fn next_to_weight_one_it_is_the_same_to_a_millionth() {
     let (near, exact) = (Reflectance::new(&near), Reflectance::new(&a));
     for k in 0..40 {
         let (t, p) = (0.02 + 0.035 * f64::from(k), f64::from(k));
-        let (wi, wo) = ([t.sin() * p.cos(), t.sin() * p.sin(), t.cos()], [-(0.5 * t).sin(), 0.0, (0.5 * t).cos()]);
-        for (x, y) in near.evaluate(wi, wo, Chi::Table).iter().zip(exact.evaluate(wi, wo, Chi::Table)) {
+        let (wi, wo) = (
+            [t.sin() * p.cos(), t.sin() * p.sin(), t.cos()],
+            [-(0.5 * t).sin(), 0.0, (0.5 * t).cos()],
+        );
+        for (x, y) in
+            near.evaluate(wi, wo, Chi::Table)
+                .iter()
+                .zip(exact.evaluate(wi, wo, Chi::Table))
+        {
             assert!((x - y).abs() <= 1e-6 * (y.abs() + 1e-3), "{x} {y}");
         }
     }
@@ -165,8 +208,13 @@ fn the_halfway_of_two_spikes_is_a_spike() {
         (flakes.lower, flakes.upper) = (vec![[l, 0.0, 0.0]], vec![[l, 0.0, 0.0]]);
         paint
     };
-    let half = at(&blend(&[&spike(20.0), &spike(80.0)]), &[0.5, 0.5]).flakes.expect("has flakes");
-    assert_eq!((half.lower, half.probability), (vec![[50.0, 0.0, 0.0]], vec![1.0]));
+    let half = at(&blend(&[&spike(20.0), &spike(80.0)]), &[0.5, 0.5])
+        .flakes
+        .expect("has flakes");
+    assert_eq!(
+        (half.lower, half.probability),
+        (vec![[50.0, 0.0, 0.0]], vec![1.0])
+    );
 }
 
 #[test]
@@ -175,8 +223,17 @@ fn flakes_fade_into_a_solid_color() {
     solid.flakes = None;
     let blend = blend(&[&metallic, &solid]);
     let none = at(&blend, &[0.0, 1.0]);
-    assert!(Reflectance::new(&none).flake_means().iter().flatten().all(|v| v.abs() < 1e-12));
-    assert_eq!(at(&blend, &[0.4, 0.6]).flakes.expect("has").texture, metallic.flakes.expect("has").texture);
+    assert!(
+        Reflectance::new(&none)
+            .flake_means()
+            .iter()
+            .flatten()
+            .all(|v| v.abs() < 1e-12)
+    );
+    assert_eq!(
+        at(&blend, &[0.4, 0.6]).flakes.expect("has").texture,
+        metallic.flakes.expect("has").texture
+    );
 }
 
 #[test]
@@ -188,24 +245,53 @@ fn each_part_follows_its_own_weights() {
     weights.flake_saturation = 0.0;
     let mixed = blend.realise(&weights).expect("fits").paint;
     let (of_a, of_b) = (at(&blend, &[1.0, 0.0]), at(&blend, &[0.0, 1.0]));
-    assert_eq!((mixed.diffuse, &mixed.color_table), (of_a.diffuse, &of_a.color_table));
+    assert_eq!(
+        (mixed.diffuse, &mixed.color_table),
+        (of_a.diffuse, &of_a.color_table)
+    );
     let (mixed, of_b) = (mixed.flakes.expect("has"), of_b.flakes.expect("has"));
-    assert!(mixed.lower.iter().zip(&of_b.lower).all(|(x, y)| x[0] == y[0] && x[1] == 0.0 && x[2] == 0.0));
+    assert!(
+        mixed
+            .lower
+            .iter()
+            .zip(&of_b.lower)
+            .all(|(x, y)| x[0] == y[0] && x[1] == 0.0 && x[2] == 0.0)
+    );
     assert_eq!(mixed.texture, of_b.texture);
 }
 
 #[test]
 fn far_weights_stay_valid_and_say_what_was_held() {
     let blend = blend(&[&paint(16, H, D), &paint(17, H, D)]);
-    for far in [[-2.0, 3.0], [0.0, 0.0], [1e6, -1e6], [1e12, 1e12], [1e-12, 0.0], [-3.0, 4.0]] {
-        let realised = blend.realise(&RealisationWeights::even(far.to_vec())).expect("finite weights");
+    for far in [
+        [-2.0, 3.0],
+        [0.0, 0.0],
+        [1e6, -1e6],
+        [1e12, 1e12],
+        [1e-12, 0.0],
+        [-3.0, 4.0],
+    ] {
+        let realised = blend
+            .realise(&RealisationWeights::even(far.to_vec()))
+            .expect("finite weights");
         realised.paint.validate(&Limits::default()).expect("valid");
         let reflectance = Reflectance::new(&realised.paint);
         let f = reflectance.evaluate([0.0, 0.6, 0.8], [0.6, 0.0, 0.8], Chi::Table);
-        assert!(f.iter().all(|v| v.is_finite() && *v >= 0.0), "{far:?}: {f:?}");
+        assert!(
+            f.iter().all(|v| v.is_finite() && *v >= 0.0),
+            "{far:?}: {f:?}"
+        );
     }
-    let clamps = blend.realise(&RealisationWeights::even(vec![-3.0, 4.0])).expect("finite").clamps;
-    assert!(clamps.iter().any(|c| c.field == "flakes.boxes" && c.count > 0 && c.worst > 0.0), "{clamps:?}");
+    let clamps = blend
+        .realise(&RealisationWeights::even(vec![-3.0, 4.0]))
+        .expect("finite")
+        .clamps;
+    assert!(
+        clamps
+            .iter()
+            .any(|c| c.field == "flakes.boxes" && c.count > 0 && c.worst > 0.0),
+        "{clamps:?}"
+    );
 }
 
 #[test]
@@ -221,9 +307,16 @@ fn weights_that_are_none_are_refused_by_field_and_value() {
 
 #[test]
 fn a_file_gives_the_blend_back() {
-    let blend = blend(&[&paint(22, H, D), &paint(23, &[0.0, 40.0], D), &paint(24, H, D)]);
+    let blend = blend(&[
+        &paint(22, H, D),
+        &paint(23, &[0.0, 40.0], D),
+        &paint(24, H, D),
+    ]);
     let bytes = blend.to_bytes();
-    assert_eq!(Blend::from_bytes(&bytes, &Limits::default()).expect("reads"), blend);
+    assert_eq!(
+        Blend::from_bytes(&bytes, &Limits::default()).expect("reads"),
+        blend
+    );
     let cut = Blend::from_bytes(&bytes[..bytes.len() - 7], &Limits::default());
     assert!(cut.expect_err("cut").to_string().contains("damaged"));
 }

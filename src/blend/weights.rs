@@ -69,7 +69,13 @@ impl RealisationWeights {
     /// The same weights for everything.
     #[must_use]
     pub fn even(weights: Vec<f64>) -> Self {
-        Self { weights, base: None, flake_lightness: None, flake_color: None, flake_saturation: 1.0 }
+        Self {
+            weights,
+            base: None,
+            flake_lightness: None,
+            flake_color: None,
+            flake_saturation: 1.0,
+        }
     }
 
     pub(super) fn base(&self) -> &[f64] {
@@ -85,7 +91,10 @@ impl RealisationWeights {
     }
 
     /// Checks every list against the number of paints.
-    pub(super) fn check<'a>(&self, names: impl Iterator<Item = &'a str> + Clone) -> Result<(), WeightError> {
+    pub(super) fn check<'a>(
+        &self,
+        names: impl Iterator<Item = &'a str> + Clone,
+    ) -> Result<(), WeightError> {
         let needed = names.clone().count();
         let lists = [
             ("weights", self.weights.as_slice()),
@@ -96,7 +105,12 @@ impl RealisationWeights {
         for (field, list) in lists {
             if list.len() != needed {
                 let paints = names.collect::<Vec<_>>().join(", ");
-                return Err(WeightError::Count { field, given: list.len(), needed, paints });
+                return Err(WeightError::Count {
+                    field,
+                    given: list.len(),
+                    needed,
+                    paints,
+                });
             }
             check_values(field, list)?;
         }
@@ -107,5 +121,11 @@ impl RealisationWeights {
 fn check_values(field: &'static str, list: &[f64]) -> Result<(), WeightError> {
     list.iter()
         .position(|w| !(-MOST..=MOST).contains(w))
-        .map_or(Ok(()), |index| Err(WeightError::Value { field, index, value: list[index] }))
+        .map_or(Ok(()), |index| {
+            Err(WeightError::Value {
+                field,
+                index,
+                value: list[index],
+            })
+        })
 }

@@ -41,7 +41,11 @@ impl Blend {
         }
         let read = start.elapsed();
         let progress = Progress::new("blending");
-        let made = blend_paints(&paints.iter().collect::<Vec<_>>(), &options.profile, &|share| progress.at(share))?;
+        let made = blend_paints(
+            &paints.iter().collect::<Vec<_>>(),
+            &options.profile,
+            &|share| progress.at(share),
+        )?;
         let blended = start.elapsed();
         output::replace(&self.out, &made.blend.to_bytes())?;
         drop(progress);

@@ -48,21 +48,35 @@ impl Evaluate {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
         let options = self.reading.options(None, &self.profile)?;
         let pairs = read(&self.directions, &options.limits)?;
-        let pairs = Pairs::from_json(&self.directions.display().to_string(), &pairs, &options.limits)?;
+        let pairs = Pairs::from_json(
+            &self.directions.display().to_string(),
+            &pairs,
+            &options.limits,
+        )?;
         let values = if self.raw {
             refuse_weights(&self.weights)?;
             let Source::Path(path) = find(&self.input)? else {
-                return Err(WorkshopError::input(&self.input, "a sample has no measurement to evaluate raw"));
+                return Err(WorkshopError::input(
+                    &self.input,
+                    "a sample has no measurement to evaluate raw",
+                ));
             };
             evaluate_raw(&open_measurement(Path::new(&path), &options)?, &pairs)?
         } else {
-            let chi = if self.no_color_table { Chi::Overall } else { Chi::Table };
+            let chi = if self.no_color_table {
+                Chi::Overall
+            } else {
+                Chi::Table
+            };
             let thing = open(&self.input, &options, &|_| ())?;
             if matches!(thing, Thing::Paint(_)) {
                 refuse_weights(&self.weights)?;
             }
-            let realised =
-                thing.realise(|blend| self.weights.for_blend(blend.ingredients().map(|(name, _)| name)).map(Some))?;
+            let realised = thing.realise(|blend| {
+                self.weights
+                    .for_blend(blend.ingredients().map(|(name, _)| name))
+                    .map(Some)
+            })?;
             evaluate(&realised.paint, &pairs, chi)
         };
         let mut bytes = serde_json::to_vec(&values).map_err(WorkshopError::internal)?;

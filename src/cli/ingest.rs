@@ -66,9 +66,16 @@ enum SpacingName {
 
 impl ReadingArgs {
     /// The options these arguments mean, for a profile.
-    pub fn options(&self, name: Option<String>, profile: &ProfileArgs) -> Result<IngestOptions, WorkshopError> {
+    pub fn options(
+        &self,
+        name: Option<String>,
+        profile: &ProfileArgs,
+    ) -> Result<IngestOptions, WorkshopError> {
         if let Some(ior) = self.coat_ior.filter(|ior| !(1.0..=4.0).contains(ior)) {
-            return Err(WorkshopError::usage("--coat-ior", format!("--coat-ior is {ior}, accepted is 1 to 4")));
+            return Err(WorkshopError::usage(
+                "--coat-ior",
+                format!("--coat-ior is {ior}, accepted is 1 to 4"),
+            ));
         }
         let layout = self.layout.map(|layout| match layout {
             LayoutName::Mpi2005 => Layout::Mpi2005,
@@ -82,7 +89,11 @@ impl ReadingArgs {
         });
         Ok(IngestOptions {
             name,
-            read: ReadOptions { layout, theta_h, header_bytes: self.header_bytes },
+            read: ReadOptions {
+                layout,
+                theta_h,
+                header_bytes: self.header_bytes,
+            },
             coat_ior: self.coat_ior,
             clusters: profile.clusters,
             profile: profile.profile()?,
@@ -98,8 +109,10 @@ impl Ingest {
         let path = match find(&self.input)? {
             Source::Path(path) => path,
             Source::Sample(sample) => {
-                let hint =
-                    format!("a sample is no measurement; 'carpaint samples export {}' writes its .paint", sample.name);
+                let hint = format!(
+                    "a sample is no measurement; 'carpaint samples export {}' writes its .paint",
+                    sample.name
+                );
                 return Err(WorkshopError::input(&self.input, hint));
             }
         };

@@ -40,7 +40,13 @@ struct Common {
     #[arg(long, global = true)]
     json: bool,
     /// Threads to compute with. Results are the same with any number.
-    #[arg(long, global = true, value_name = "N", env = "RAYON_NUM_THREADS", hide_env = true)]
+    #[arg(
+        long,
+        global = true,
+        value_name = "N",
+        env = "RAYON_NUM_THREADS",
+        hide_env = true
+    )]
     threads: Option<usize>,
 }
 
@@ -84,7 +90,10 @@ pub fn run() -> ExitCode {
 
 fn start(cli: Cli) -> Result<(), WorkshopError> {
     if cli.common.threads == Some(0) {
-        return Err(WorkshopError::usage("--threads", "--threads is 0, accepted is 1 or more"));
+        return Err(WorkshopError::usage(
+            "--threads",
+            "--threads is 0, accepted is 1 or more",
+        ));
     }
     rayon::ThreadPoolBuilder::new()
         .num_threads(cli.common.threads.unwrap_or(0))
@@ -116,7 +125,15 @@ mod tests {
 
     #[test]
     fn negative_weights_need_no_equals_sign() {
-        let cli = Cli::try_parse_from(["carpaint", "realise", "b.blend", "--weights", "-2,3", "--out", "x.zip"]);
+        let cli = Cli::try_parse_from([
+            "carpaint",
+            "realise",
+            "b.blend",
+            "--weights",
+            "-2,3",
+            "--out",
+            "x.zip",
+        ]);
         assert!(cli.is_ok(), "{:?}", cli.err());
     }
 }

@@ -9,9 +9,17 @@ use crate::workshop::WorkshopError;
 
 /// Replaces a file atomically: a temporary file beside it, synced, then renamed over it.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), WorkshopError> {
-    let fail = |e: std::io::Error| WorkshopError::output(path.display(), format!("cannot be written: {e}"));
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    let mut file = tempfile::Builder::new().prefix(".carpaint-").tempfile_in(folder).map_err(fail)?;
+    let fail = |e: std::io::Error| {
+        WorkshopError::output(path.display(), format!("cannot be written: {e}"))
+    };
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or_else(|| Path::new("."));
+    let mut file = tempfile::Builder::new()
+        .prefix(".carpaint-")
+        .tempfile_in(folder)
+        .map_err(fail)?;
     file.write_all(bytes).map_err(fail)?;
     file.as_file().sync_all().map_err(fail)?;
     open_to_others(file.path()).map_err(fail)?;
@@ -37,5 +45,7 @@ pub fn print_json(value: &impl Serialize) -> Result<(), WorkshopError> {
     line.push(b'\n');
     let fail = |e: std::io::Error| WorkshopError::output("standard output", e);
     let mut out = std::io::stdout().lock();
-    out.write_all(&line).and_then(|()| out.flush()).map_err(fail)
+    out.write_all(&line)
+        .and_then(|()| out.flush())
+        .map_err(fail)
 }

@@ -13,7 +13,9 @@ use super::profile::ProfileArgs;
 use super::progress::Progress;
 use super::realise::refuse_weights;
 use super::weights::WeightArgs;
-use crate::workshop::{PictureFormat, PreviewOptions, Thing, WorkshopError, open, preview, read_environment};
+use crate::workshop::{
+    PictureFormat, PreviewOptions, Thing, WorkshopError, open, preview, read_environment,
+};
 
 /// Draw a paint, a blend at given weights, or a sample.
 #[derive(Args, Clone, Debug)]
@@ -58,10 +60,19 @@ impl FromStr for Size {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("'{text}' is no size; accepted is WxH, such as 512x512, 1 to 16384 each");
+        let wrong =
+            || format!("'{text}' is no size; accepted is WxH, such as 512x512, 1 to 16384 each");
         let (width, height) = text.split_once('x').ok_or_else(wrong)?;
-        let side = |s: &str| s.parse().ok().filter(|n| (1..=16384).contains(n)).ok_or_else(wrong);
-        Ok(Self { width: side(width)?, height: side(height)? })
+        let side = |s: &str| {
+            s.parse()
+                .ok()
+                .filter(|n| (1..=16384).contains(n))
+                .ok_or_else(wrong)
+        };
+        Ok(Self {
+            width: side(width)?,
+            height: side(height)?,
+        })
     }
 }
 
@@ -73,10 +84,16 @@ impl Preview {
         let thing = open(&self.input, &options, &|_| ())?;
         let weights = match &thing {
             Thing::Paint(_) => refuse_weights(&self.weights).map(|()| None)?,
-            Thing::Blend(blend) => Some(self.weights.for_blend(blend.ingredients().map(|(name, _)| name))?),
+            Thing::Blend(blend) => Some(
+                self.weights
+                    .for_blend(blend.ingredients().map(|(name, _)| name))?,
+            ),
         };
-        let environment =
-            self.environment.as_deref().map(|path| read_environment(path, &options.limits)).transpose()?;
+        let environment = self
+            .environment
+            .as_deref()
+            .map(|path| read_environment(path, &options.limits))
+            .transpose()?;
         let opened = start.elapsed();
         let wanted = PreviewOptions {
             scene: self.scene.clone(),
@@ -85,7 +102,14 @@ impl Preview {
             environment,
         };
         let progress = Progress::new("drawing");
-        let made = preview(&thing, weights.as_ref(), &wanted, format, &options.limits, &|share| progress.at(share))?;
+        let made = preview(
+            &thing,
+            weights.as_ref(),
+            &wanted,
+            format,
+            &options.limits,
+            &|share| progress.at(share),
+        )?;
         let drawn = start.elapsed();
         output::replace(&self.out, &made.bytes)?;
         drop(progress);
@@ -100,12 +124,19 @@ impl Preview {
             output::replace(timings, seconds.to_string().as_bytes())?;
         }
         if json {
-            return output::print_json(&json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report }));
+            return output::print_json(
+                &json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report }),
+            );
         }
         for line in &made.notes {
             eprintln!("note: {line}");
         }
-        eprintln!("{}: {} x {}", self.out.display(), self.size.width, self.size.height);
+        eprintln!(
+            "{}: {} x {}",
+            self.out.display(),
+            self.size.width,
+            self.size.height
+        );
         Ok(())
     }
 }

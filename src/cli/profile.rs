@@ -19,10 +19,13 @@ pub struct ProfileArgs {
 impl ProfileArgs {
     /// The profile these arguments mean.
     pub fn profile(&self) -> Result<Profile, WorkshopError> {
-        let profile = Profile::named(&self.profile).map_err(|e| WorkshopError::usage("--profile", e))?;
+        let profile =
+            Profile::named(&self.profile).map_err(|e| WorkshopError::usage("--profile", e))?;
         match self.clusters {
             None => Ok(profile),
-            Some(clusters) => profile.with_clusters(clusters).map_err(|e| WorkshopError::usage("--clusters", e)),
+            Some(clusters) => profile
+                .with_clusters(clusters)
+                .map_err(|e| WorkshopError::usage("--clusters", e)),
         }
     }
 }

@@ -12,8 +12,11 @@ pub struct Progress {
 impl Progress {
     /// A bar, if stderr is a terminal.
     pub fn new(what: &str) -> Self {
-        let target =
-            if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let target = if std::io::stderr().is_terminal() {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        };
         let bar = ProgressBar::with_draw_target(Some(1000), target).with_message(what.to_owned());
         if let Ok(style) = ProgressStyle::with_template("{msg} {bar:30} {percent:>3} % {eta}") {
             bar.set_style(style);
@@ -24,7 +27,8 @@ impl Progress {
     /// Moves the bar to a share of 0 to 1.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a bar of a thousand steps
     pub fn at(&self, share: f32) {
-        self.bar.set_position((share.clamp(0.0, 1.0) * 1000.0) as u64);
+        self.bar
+            .set_position((share.clamp(0.0, 1.0) * 1000.0) as u64);
     }
 }
 

@@ -35,12 +35,17 @@ impl Realise {
         let thing = open(&self.input, &options, &|_| ())?;
         let weights = match &thing {
             Thing::Paint(_) => refuse_weights(&self.weights).map(|()| None)?,
-            Thing::Blend(blend) => Some(self.weights.for_blend(blend.ingredients().map(|(name, _)| name))?),
+            Thing::Blend(blend) => Some(
+                self.weights
+                    .for_blend(blend.ingredients().map(|(name, _)| name))?,
+            ),
         };
         let made = realise(&thing, weights.as_ref(), format, &options.profile)?;
         output::replace(&self.out, &made.bytes)?;
         if json {
-            return output::print_json(&json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report }));
+            return output::print_json(
+                &json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report }),
+            );
         }
         for line in &made.notes {
             eprintln!("note: {line}");
@@ -55,5 +60,8 @@ pub fn refuse_weights(weights: &WeightArgs) -> Result<(), WorkshopError> {
     if weights.is_empty() {
         return Ok(());
     }
-    Err(WorkshopError::usage("--weights", "this is one paint, weights are for a .blend: leave them out"))
+    Err(WorkshopError::usage(
+        "--weights",
+        "this is one paint, weights are for a .blend: leave them out",
+    ))
 }

@@ -42,10 +42,15 @@ impl Samples {
                 let bare = name.strip_prefix("sample:").unwrap_or(name);
                 let sample = sample_by_name(bare).ok_or_else(|| {
                     let known: Vec<&str> = SAMPLES.iter().map(|s| s.name).collect();
-                    WorkshopError::input(name, format!("there is no such sample; there are {}", known.join(", ")))
+                    WorkshopError::input(
+                        name,
+                        format!("there is no such sample; there are {}", known.join(", ")),
+                    )
                 })?;
                 let progress = Progress::new("simulating flakes");
-                let bytes = sample.build(&profile.profile()?, &|share| progress.at(share))?.to_bytes();
+                let bytes = sample
+                    .build(&profile.profile()?, &|share| progress.at(share))?
+                    .to_bytes();
                 output::replace(out, &bytes)?;
                 drop(progress);
                 if json {
@@ -64,7 +69,9 @@ fn list(json: bool) -> Result<(), WorkshopError> {
             .iter()
             .map(|s| json!({ "name": s.name, "about": s.about, "simulated_flakes": s.is_metallic() }))
             .collect();
-        return output::print_json(&json!({ "samples": samples, "source": "Günther et al., VMV 2005" }));
+        return output::print_json(
+            &json!({ "samples": samples, "source": "Günther et al., VMV 2005" }),
+        );
     }
     for sample in &SAMPLES {
         println!("sample:{:<16} {}", sample.name, sample.about);

@@ -33,11 +33,14 @@ impl Serve {
         tracing_subscriber::fmt()
             .with_writer(std::io::stderr)
             .with_env_filter(
-                tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "carpaint=info".into()),
+                tracing_subscriber::EnvFilter::try_from_default_env()
+                    .unwrap_or_else(|_| "carpaint=info".into()),
             )
             .init();
-        let runtime =
-            tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(WorkshopError::internal)?;
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .enable_all()
+            .build()
+            .map_err(WorkshopError::internal)?;
         let served = runtime.block_on(self.serve(json));
         // A picture that nobody waits for any more is not waited for either.
         runtime.shutdown_background();
@@ -49,12 +52,17 @@ impl Serve {
             ServeError::Listen { .. } => WorkshopError::usage("--listen", error),
             _ => WorkshopError::output(self.data.display(), error),
         };
-        let listener = TcpListener::bind(self.listen)
-            .await
-            .map_err(|source| refused(ServeError::Listen { address: self.listen, source }))?;
+        let listener = TcpListener::bind(self.listen).await.map_err(|source| {
+            refused(ServeError::Listen {
+                address: self.listen,
+                source,
+            })
+        })?;
         let address = listener.local_addr().map_err(WorkshopError::internal)?;
         let config = ServiceConfig::new(self.data.clone());
-        let app = service::open(config, Arc::new(Workshop::new(Limits::default()))).await.map_err(refused)?;
+        let app = service::open(config, Arc::new(Workshop::new(Limits::default())))
+            .await
+            .map_err(refused)?;
         if !self.no_samples {
             service::load_samples(&app)
                 .await
@@ -62,7 +70,9 @@ impl Serve {
         }
         app.set_ready();
         if json {
-            super::output::print_json(&serde_json::json!({ "listening": format!("http://{address}") }))?;
+            super::output::print_json(
+                &serde_json::json!({ "listening": format!("http://{address}") }),
+            )?;
         } else {
             eprintln!("carpaint is ready: open http://{address}");
         }

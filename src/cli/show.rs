@@ -97,17 +97,29 @@ fn inline(value: &Value) -> Option<String> {
     match value {
         Value::Null => Some("none".to_owned()),
         Value::Bool(yes) => Some(if *yes { "yes" } else { "no" }.to_owned()),
-        Value::Number(n) => {
-            Some(n.as_f64().filter(|_| !n.is_u64()).map_or_else(|| n.to_string(), |v| format!("{v:.5}")))
-        }
+        Value::Number(n) => Some(
+            n.as_f64()
+                .filter(|_| !n.is_u64())
+                .map_or_else(|| n.to_string(), |v| format!("{v:.5}")),
+        ),
         Value::String(text) => Some(text.clone()),
         Value::Array(list) if list.is_empty() => Some("none".to_owned()),
-        Value::Array(list) if list.iter().all(Value::is_number) => {
-            Some(list.iter().filter_map(inline).collect::<Vec<_>>().join(", "))
-        }
+        Value::Array(list) if list.iter().all(Value::is_number) => Some(
+            list.iter()
+                .filter_map(inline)
+                .collect::<Vec<_>>()
+                .join(", "),
+        ),
         Value::Object(map) if map.is_empty() => Some("none".to_owned()),
-        Value::Object(map) if map.len() <= 4 && map.values().all(|v| v.is_number() || v.is_string()) => {
-            Some(map.iter().filter_map(|(k, v)| inline(v).map(|v| format!("{k} {v}"))).collect::<Vec<_>>().join(" · "))
+        Value::Object(map)
+            if map.len() <= 4 && map.values().all(|v| v.is_number() || v.is_string()) =>
+        {
+            Some(
+                map.iter()
+                    .filter_map(|(k, v)| inline(v).map(|v| format!("{k} {v}")))
+                    .collect::<Vec<_>>()
+                    .join(" · "),
+            )
         }
         _ => None,
     }

@@ -44,7 +44,10 @@ impl Texels {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
         for (name, angle) in [("--theta-h", self.theta_h), ("--theta-d", self.theta_d)] {
             if !(0.0..=90.0).contains(&angle) {
-                return Err(WorkshopError::usage(name, format!("{name} is {angle}, accepted is 0 to 90 degrees")));
+                return Err(WorkshopError::usage(
+                    name,
+                    format!("{name} is {angle}, accepted is 0 to 90 degrees"),
+                ));
             }
         }
         let options = ReadingArgs::default().options(None, &self.profile)?;
@@ -52,15 +55,26 @@ impl Texels {
         if matches!(thing, Thing::Paint(_)) {
             refuse_weights(&self.weights)?;
         }
-        let realised =
-            thing.realise(|blend| self.weights.for_blend(blend.ingredients().map(|(name, _)| name)).map(Some))?;
-        let (angles, size) = ([self.theta_h, self.theta_d], [self.size.width, self.size.height]);
+        let realised = thing.realise(|blend| {
+            self.weights
+                .for_blend(blend.ingredients().map(|(name, _)| name))
+                .map(Some)
+        })?;
+        let (angles, size) = (
+            [self.theta_h, self.theta_d],
+            [self.size.width, self.size.height],
+        );
         let bytes = texels(&realised.paint, angles, size, self.seed, &options.limits)?;
         output::replace(&self.out, &bytes)?;
         if json {
             return output::print_json(&json!({ "out": self.out, "bytes": bytes.len() }));
         }
-        eprintln!("{}: {} x {} texels", self.out.display(), self.size.width, self.size.height);
+        eprintln!(
+            "{}: {} x {} texels",
+            self.out.display(),
+            self.size.width,
+            self.size.height
+        );
         Ok(())
     }
 }

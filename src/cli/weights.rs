@@ -58,7 +58,10 @@ impl WeightArgs {
     }
 
     /// The weights for a blend of the named paints.
-    pub fn for_blend<'a>(&self, names: impl Iterator<Item = &'a str>) -> Result<RealisationWeights, WorkshopError> {
+    pub fn for_blend<'a>(
+        &self,
+        names: impl Iterator<Item = &'a str>,
+    ) -> Result<RealisationWeights, WorkshopError> {
         let Some(weights) = &self.weights else {
             let names: Vec<&str> = names.collect();
             let problem = format!(

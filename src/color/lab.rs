@@ -40,26 +40,46 @@ pub struct ReadingLab {
 pub(crate) const KNEE: f64 = 6.0 / 29.0;
 
 fn compress(t: f64) -> f64 {
-    if t > KNEE * KNEE * KNEE { t.cbrt() } else { t / (3.0 * KNEE * KNEE) + 4.0 / 29.0 }
+    if t > KNEE * KNEE * KNEE {
+        t.cbrt()
+    } else {
+        t / (3.0 * KNEE * KNEE) + 4.0 / 29.0
+    }
 }
 
 /// Inverse of the CIELAB compression: relative light of one channel from its `f` value.
 pub(crate) fn expand(f: f64) -> f64 {
-    if f > KNEE { f * f * f } else { 3.0 * KNEE * KNEE * (f - 4.0 / 29.0) }
+    if f > KNEE {
+        f * f * f
+    } else {
+        3.0 * KNEE * KNEE * (f - 4.0 / 29.0)
+    }
 }
 
 /// [`expand`] at texel precision.
 pub(crate) fn expand_f32(f: f32) -> f32 {
     const KNEE: f32 = 6.0 / 29.0;
-    if f > KNEE { f * f * f } else { 3.0 * KNEE * KNEE * (f - 4.0 / 29.0) }
+    if f > KNEE {
+        f * f * f
+    } else {
+        3.0 * KNEE * KNEE * (f - 4.0 / 29.0)
+    }
 }
 
 impl Lab {
     /// Lab of an XYZ color under a white point.
     #[must_use]
     pub fn from_xyz(xyz: [f64; 3], white: WhitePoint) -> Self {
-        let [x, y, z] = [compress(xyz[0] / white.x), compress(xyz[1] / white.y), compress(xyz[2] / white.z)];
-        Self { l: 116.0 * y - 16.0, a: 500.0 * (x - y), b: 200.0 * (y - z) }
+        let [x, y, z] = [
+            compress(xyz[0] / white.x),
+            compress(xyz[1] / white.y),
+            compress(xyz[2] / white.z),
+        ];
+        Self {
+            l: 116.0 * y - 16.0,
+            a: 500.0 * (x - y),
+            b: 200.0 * (y - z),
+        }
     }
 
     /// XYZ of a Lab color under a white point.
@@ -67,7 +87,11 @@ impl Lab {
     pub fn to_xyz(self, white: WhitePoint) -> [f64; 3] {
         let y = (self.l + 16.0) / 116.0;
         let (x, z) = (y + self.a / 500.0, y - self.b / 200.0);
-        [white.x * expand(x), white.y * expand(y), white.z * expand(z)]
+        [
+            white.x * expand(x),
+            white.y * expand(y),
+            white.z * expand(z),
+        ]
     }
 
     /// Lab of a linear sRGB reflectance factor (`π f` of a BRDF value `f`).
@@ -103,14 +127,25 @@ mod tests {
     #[test]
     fn white_is_one_hundred() {
         let white = Lab::from_xyz([D65_2.x, 1.0, D65_2.z], D65_2);
-        assert_eq!(white, Lab { l: 100.0, a: 0.0, b: 0.0 });
+        assert_eq!(
+            white,
+            Lab {
+                l: 100.0,
+                a: 0.0,
+                b: 0.0
+            }
+        );
     }
 
     /// sRGB red, worked from the published formulas with 30 digits.
     #[test]
     fn red_has_its_published_lab() {
         let red = Lab::from_rgb([1.0, 0.0, 0.0]);
-        for (x, y) in red.to_array().into_iter().zip([53.240_79, 80.092_46, 67.203_2]) {
+        for (x, y) in red
+            .to_array()
+            .into_iter()
+            .zip([53.240_79, 80.092_46, 67.203_2])
+        {
             assert!((x - y).abs() < 5e-3, "{red:?}");
         }
     }

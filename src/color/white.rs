@@ -40,7 +40,11 @@ pub struct WhitePoint {
 pub const D65_2: WhitePoint = white(95.047, 108.883);
 
 const fn white(x: f64, z: f64) -> WhitePoint {
-    WhitePoint { x: x / 100.0, y: 1.0, z: z / 100.0 }
+    WhitePoint {
+        x: x / 100.0,
+        y: 1.0,
+        z: z / 100.0,
+    }
 }
 
 impl WhitePoint {

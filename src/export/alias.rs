@@ -46,13 +46,23 @@ impl Builder {
         self.scaled.clear();
         self.scaled.extend(probability.iter().map(|p| p * n));
         for (k, &share) in (0_u32..).zip(&self.scaled) {
-            table.push(AliasEntry { threshold: 1.0, alias: k });
-            if share < 1.0 { self.small.push(k) } else { self.large.push(k) }
+            table.push(AliasEntry {
+                threshold: 1.0,
+                alias: k,
+            });
+            if share < 1.0 {
+                self.small.push(k)
+            } else {
+                self.large.push(k)
+            }
         }
         while let (Some(&low), Some(&high)) = (self.small.last(), self.large.last()) {
             self.small.pop();
             let share = self.scaled[low as usize];
-            table[first + low as usize] = AliasEntry { threshold: share.max(0.0), alias: high };
+            table[first + low as usize] = AliasEntry {
+                threshold: share.max(0.0),
+                alias: high,
+            };
             let left = (self.scaled[high as usize] + share) - 1.0;
             self.scaled[high as usize] = left;
             if left < 1.0 {
@@ -83,14 +93,25 @@ mod tests {
 
     #[test]
     fn a_single_cluster_is_always_drawn() {
-        assert_eq!(alias_table(&[1.0]), [AliasEntry { threshold: 1.0, alias: 0 }]);
+        assert_eq!(
+            alias_table(&[1.0]),
+            [AliasEntry {
+                threshold: 1.0,
+                alias: 0
+            }]
+        );
     }
 
     #[test]
     fn a_cluster_of_probability_zero_is_never_drawn() {
         let table = alias_table(&[0.0, 0.25, 0.75]);
         assert_eq!(table[0].threshold, 0.0);
-        assert!(table.iter().skip(1).all(|entry| entry.alias != 0 || entry.threshold == 1.0));
+        assert!(
+            table
+                .iter()
+                .skip(1)
+                .all(|entry| entry.alias != 0 || entry.threshold == 1.0)
+        );
     }
 
     proptest! {

@@ -27,12 +27,19 @@ const COMPANIONS: [(&str, &str); 5] = [
 /// # Errors
 ///
 /// [`ExportError`] for a number that is not finite, or more clusters than textures address.
-pub fn bundle(paint: &CarPaint, about: &About, settings: &ExportSettings) -> Result<Vec<u8>, ExportError> {
+pub fn bundle(
+    paint: &CarPaint,
+    about: &About,
+    settings: &ExportSettings,
+) -> Result<Vec<u8>, ExportError> {
     let textures = Textures::of(paint, settings)?;
     let json = document(paint, about, settings, &textures, &Carrier::Files)?;
-    let size: usize = textures.list.iter().map(|t| t.bytes.len()).sum::<usize>() + json.len() + (64 << 10);
+    let size: usize =
+        textures.list.iter().map(|t| t.bytes.len()).sum::<usize>() + json.len() + (64 << 10);
     let mut zip = ZipWriter::new(Cursor::new(Vec::with_capacity(size)));
-    let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).unix_permissions(0o644);
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .unix_permissions(0o644);
     let mut entry = |name: &str, bytes: &[u8]| -> Result<(), ExportError> {
         zip.start_file(name, options)?;
         Ok(zip.write_all(bytes)?)
@@ -78,11 +85,17 @@ mod tests {
     #[test]
     fn every_texture_of_the_document_is_in_the_archive() {
         for precision in [Precision::F32, Precision::F16, Precision::Eight] {
-            let settings = ExportSettings { precision, ..ExportSettings::default() };
+            let settings = ExportSettings {
+                precision,
+                ..ExportSettings::default()
+            };
             let files = files(&bundle(&metallic(4, 3, 20), &about(), &settings).expect("written"));
             let document: Value = serde_json::from_slice(&files[0].1).expect("JSON");
             for (name, entry) in document["textures"].as_object().expect("a map") {
-                assert!(files.iter().any(|(file, _)| entry["file"] == **file), "{name}");
+                assert!(
+                    files.iter().any(|(file, _)| entry["file"] == **file),
+                    "{name}"
+                );
             }
         }
     }
@@ -90,20 +103,33 @@ mod tests {
     #[test]
     fn every_number_of_the_document_is_explained() {
         let mut paint = metallic(4, 3, 20);
-        paint.coat = paint.coat.map(|coat| crate::paint::Coat { thickness_um: Some(40.0), ..coat });
-        let settings = ExportSettings { precision: Precision::Eight, ..ExportSettings::default() };
+        paint.coat = paint.coat.map(|coat| crate::paint::Coat {
+            thickness_um: Some(40.0),
+            ..coat
+        });
+        let settings = ExportSettings {
+            precision: Precision::Eight,
+            ..ExportSettings::default()
+        };
         let json = material_json(&paint, &about(), &settings).expect("written");
         assert_documented(&serde_json::from_slice(&json).expect("JSON"));
     }
 
     #[test]
     fn a_solid_color_has_no_flake_textures() {
-        let paint = CarPaint { flakes: None, ..metallic(1, 1, 1) };
-        let names: Vec<String> = files(&bundle(&paint, &about(), &ExportSettings::default()).expect("written"))
-            .into_iter()
-            .map(|(name, _)| name)
-            .collect();
-        assert_eq!(names[..3], ["material.json", "color_table.exr", "angles.exr"]);
+        let paint = CarPaint {
+            flakes: None,
+            ..metallic(1, 1, 1)
+        };
+        let names: Vec<String> =
+            files(&bundle(&paint, &about(), &ExportSettings::default()).expect("written"))
+                .into_iter()
+                .map(|(name, _)| name)
+                .collect();
+        assert_eq!(
+            names[..3],
+            ["material.json", "color_table.exr", "angles.exr"]
+        );
         assert!(!names.iter().any(|name| name.starts_with("corners")));
     }
 
@@ -117,7 +143,12 @@ mod tests {
         let files = files(&bundle(&paint, &about(), &ExportSettings::default()).expect("written"));
         let document: Value = serde_json::from_slice(&files[0].1).expect("JSON");
         assert_eq!(document["clamped"][0]["what"], "slice_means");
-        assert!(document["clamped"][0]["farthest"].as_f64().expect("a number") > 65504.0);
+        assert!(
+            document["clamped"][0]["farthest"]
+                .as_f64()
+                .expect("a number")
+                > 65504.0
+        );
     }
 
     #[test]
@@ -125,8 +156,14 @@ mod tests {
         let mut paint = metallic(2, 2, 3);
         paint.flakes.as_mut().expect("flakes").upper[1][2] = f32::NAN;
         for precision in [Precision::F32, Precision::F16, Precision::Eight] {
-            let settings = ExportSettings { precision, ..ExportSettings::default() };
-            assert!(bundle(&paint, &about(), &settings).is_err(), "{precision:?}");
+            let settings = ExportSettings {
+                precision,
+                ..ExportSettings::default()
+            };
+            assert!(
+                bundle(&paint, &about(), &settings).is_err(),
+                "{precision:?}"
+            );
         }
     }
 }

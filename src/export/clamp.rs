@@ -24,7 +24,10 @@ pub struct Clamped {
 
 /// Refuses numbers that are not finite.
 pub(super) fn finite(what: &'static str, values: &[f32]) -> Result<(), ExportError> {
-    values.iter().position(|v| !v.is_finite()).map_or(Ok(()), |index| Err(ExportError::NotFinite { what, index }))
+    values
+        .iter()
+        .position(|v| !v.is_finite())
+        .map_or(Ok(()), |index| Err(ExportError::NotFinite { what, index }))
 }
 
 /// Halves of finite numbers, clamped to ±65504. Adds to `clamped` when the clamp bit.
@@ -50,7 +53,12 @@ pub(super) fn halves(
             }
         } else {
             let (farthest, limit) = (f64::from(farthest), f64::from(HALF_MAX));
-            clamped.push(Clamped { what, count, farthest, limit });
+            clamped.push(Clamped {
+                what,
+                count,
+                farthest,
+                limit,
+            });
         }
     }
     let mut out = vec![f16::ZERO; values.len()];
@@ -67,14 +75,31 @@ mod tests {
         let mut clamped = Vec::new();
         let mut values = [1.0, 70000.0, -1e9, 65504.0];
         let out = halves("means", &mut values, &mut clamped).expect("finite");
-        assert_eq!(out.iter().map(|h| h.to_f32()).collect::<Vec<_>>(), [1.0, 65504.0, -65504.0, 65504.0]);
-        assert_eq!(clamped, [Clamped { what: "means", count: 2, farthest: -1e9, limit: 65504.0 }]);
+        assert_eq!(
+            out.iter().map(|h| h.to_f32()).collect::<Vec<_>>(),
+            [1.0, 65504.0, -65504.0, 65504.0]
+        );
+        assert_eq!(
+            clamped,
+            [Clamped {
+                what: "means",
+                count: 2,
+                farthest: -1e9,
+                limit: 65504.0
+            }]
+        );
     }
 
     #[test]
     fn what_is_not_finite_is_refused_by_place() {
         let error = halves("means", &mut [0.0, f32::NAN], &mut Vec::new()).expect_err("refused");
-        assert!(matches!(error, ExportError::NotFinite { what: "means", index: 1 }));
+        assert!(matches!(
+            error,
+            ExportError::NotFinite {
+                what: "means",
+                index: 1
+            }
+        ));
     }
 
     #[test]
@@ -82,7 +107,10 @@ mod tests {
         // Between 65504 and 65520 a half rounds down, above it would be infinite.
         let mut clamped = Vec::new();
         for value in [65504.1_f32, 65519.9, 65520.0, f32::MAX] {
-            assert_eq!(halves("x", &mut [value], &mut clamped).expect("finite"), [f16::MAX]);
+            assert_eq!(
+                halves("x", &mut [value], &mut clamped).expect("finite"),
+                [f16::MAX]
+            );
         }
         assert_eq!(clamped[0].count, 4);
     }

@@ -162,7 +162,14 @@ pub(super) fn document(
 
 fn inline(file: &str, bytes: &[u8]) -> String {
     use base64::Engine;
-    let kind = if std::path::Path::new(file).extension().is_some_and(|e| e == "png") { "png" } else { "x-exr" };
+    let kind = if std::path::Path::new(file)
+        .extension()
+        .is_some_and(|e| e == "png")
+    {
+        "png"
+    } else {
+        "x-exr"
+    };
     let mut out = format!("data:image/{kind};base64,");
     base64::engine::general_purpose::STANDARD.encode_string(bytes, &mut out);
     out
@@ -173,7 +180,10 @@ fn documentation() -> Value {
     let mut out = Map::new();
     for (path, unit, range, about) in NUMBERS {
         let range = [range.0, range.1].map(|v| if v.is_finite() { json!(v) } else { Value::Null });
-        out.insert((*path).into(), json!({"unit": unit, "range": range, "about": about}));
+        out.insert(
+            (*path).into(),
+            json!({"unit": unit, "range": range, "about": about}),
+        );
     }
     Value::Object(out)
 }
@@ -228,11 +238,21 @@ pub(super) mod tests {
             Value::Number(_) => {
                 out.insert(path.to_string());
             }
-            Value::Array(list) => list.iter().for_each(|entry| paths(entry, &format!("{path}[]"), out)),
+            Value::Array(list) => list
+                .iter()
+                .for_each(|entry| paths(entry, &format!("{path}[]"), out)),
             Value::Object(map) => {
                 for (key, entry) in map {
                     let key = if path == "textures" { "*" } else { key };
-                    paths(entry, &if path.is_empty() { key.to_string() } else { format!("{path}.{key}") }, out);
+                    paths(
+                        entry,
+                        &if path.is_empty() {
+                            key.to_string()
+                        } else {
+                            format!("{path}.{key}")
+                        },
+                        out,
+                    );
                 }
             }
             _ => {}
@@ -248,7 +268,10 @@ pub(super) mod tests {
             }
         }
         for path in found {
-            assert!(document["documentation"].get(&path).is_some(), "{path} is not documented");
+            assert!(
+                document["documentation"].get(&path).is_some(),
+                "{path} is not documented"
+            );
         }
     }
 }

@@ -41,7 +41,10 @@ impl Plane<'_> {
 
 /// The bytes of a file with these channels, `name` ascending, each `width * height` numbers.
 pub(super) fn exr(width: usize, height: usize, channels: &[(&str, Plane<'_>)]) -> Vec<u8> {
-    debug_assert!(channels.is_sorted_by_key(|(name, _)| *name), "channels stand in alphabetical order");
+    debug_assert!(
+        channels.is_sorted_by_key(|(name, _)| *name),
+        "channels stand in alphabetical order"
+    );
     let line: usize = channels.iter().map(|(_, plane)| plane.size() * width).sum();
     let mut out = Vec::with_capacity(512 + height * (16 + line));
     out.extend_from_slice(&20_000_630_u32.to_le_bytes());
@@ -106,9 +109,15 @@ mod tests {
     #[test]
     fn the_exr_crate_reads_what_was_written() {
         let (width, height) = (5, 3);
-        let half: Vec<f16> = (0..15_u8).map(|k| f16::from_f32(f32::from(k) - 7.5)).collect();
+        let half: Vec<f16> = (0..15_u8)
+            .map(|k| f16::from_f32(f32::from(k) - 7.5))
+            .collect();
         let float: Vec<f32> = (0..15_u8).map(|k| f32::from(k) / 3.0).collect();
-        let bytes = super::exr(width, height, &[("B", Plane::Half(&half)), ("R", Plane::Float(&float))]);
+        let bytes = super::exr(
+            width,
+            height,
+            &[("B", Plane::Half(&half)), ("R", Plane::Float(&float))],
+        );
         let image = read()
             .no_deep_data()
             .largest_resolution_level()
@@ -126,6 +135,9 @@ mod tests {
             half.iter().map(|h| h.to_f32()).collect::<Vec<_>>()
         );
         assert_eq!(list[1].name.to_string(), "R");
-        assert_eq!(list[1].sample_data.values_as_f32().collect::<Vec<_>>(), float);
+        assert_eq!(
+            list[1].sample_data.values_as_f32().collect::<Vec<_>>(),
+            float
+        );
     }
 }

@@ -19,7 +19,11 @@ use crate::paint::{CarPaint, RandomTexture, Reflectance};
 /// # Errors
 ///
 /// [`ExportError`] for a number that is not finite, or a picture that cannot be encoded.
-pub fn glb(paint: &CarPaint, about: &About, _settings: &ExportSettings) -> Result<Vec<u8>, ExportError> {
+pub fn glb(
+    paint: &CarPaint,
+    about: &About,
+    _settings: &ExportSettings,
+) -> Result<Vec<u8>, ExportError> {
     let reflectance = Reflectance::new(paint);
     let (mut material, mut report) = fit(&reflectance);
     let mut file = Builder::default();
@@ -33,7 +37,10 @@ pub fn glb(paint: &CarPaint, about: &About, _settings: &ExportSettings) -> Resul
         material.specular_color = made.f0_factor.map(|f| f / white);
         baked = Some(made);
     }
-    let tile_um = paint.flakes.as_ref().map(|f| f.texture.texel_um * f64::from(RandomTexture::TILE));
+    let tile_um = paint
+        .flakes
+        .as_ref()
+        .map(|f| f.texture.texel_um * f64::from(RandomTexture::TILE));
     let mesh = ball(tile_um);
     let primitive = file.mesh(&mesh, baked.is_some())?;
     let textures = baked.as_ref().map(|baked| file.pictures(baked));
@@ -55,8 +62,10 @@ pub fn glb(paint: &CarPaint, about: &About, _settings: &ExportSettings) -> Resul
     });
     if !file.images.is_empty() {
         document["images"] = file.images.into();
-        document["textures"] = json!([{ "sampler": 0, "source": 0 }, { "sampler": 0, "source": 1 }]);
-        document["samplers"] = json!([{ "magFilter": 9729, "minFilter": 9987, "wrapS": 10497, "wrapT": 10497 }]);
+        document["textures"] =
+            json!([{ "sampler": 0, "source": 0 }, { "sampler": 0, "source": 1 }]);
+        document["samplers"] =
+            json!([{ "magFilter": 9729, "minFilter": 9987, "wrapS": 10497, "wrapT": 10497 }]);
     }
     Ok(chunks(&serde_json::to_vec(&document)?, &file.body))
 }
@@ -89,10 +98,16 @@ impl Builder {
         self.views.len() - 1
     }
 
-    fn accessor(&mut self, view: usize, component: u32, kind: &str, count: usize, name: &str) -> usize {
+    fn accessor(
+        &mut self,
+        view: usize,
+        component: u32,
+        kind: &str,
+        count: usize,
+        name: &str,
+    ) -> usize {
         let (component, kind) = (json!(component), json!(kind));
-        let accessor =
-            json!({ "bufferView": view, "componentType": component, "type": kind, "count": count, "name": name });
+        let accessor = json!({ "bufferView": view, "componentType": component, "type": kind, "count": count, "name": name });
         self.accessors.push(accessor);
         self.accessors.len() - 1
     }
@@ -117,15 +132,28 @@ impl Builder {
         const ELEMENTS: Option<u32> = Some(34963);
         let mut attributes = Map::new();
         let positions = self.floats("positions", &mesh.positions, VERTICES)?;
-        let radius = mesh.positions.iter().flatten().fold(0.0_f32, |m, v| m.max(v.abs()));
+        let radius = mesh
+            .positions
+            .iter()
+            .flatten()
+            .fold(0.0_f32, |m, v| m.max(v.abs()));
         self.accessors[positions]["min"] = bounds(&mesh.positions, f32::min).into();
         self.accessors[positions]["max"] = bounds(&mesh.positions, f32::max).into();
         debug_assert!(radius.is_finite(), "a ball has a size");
         attributes.insert("POSITION".into(), positions.into());
-        attributes.insert("NORMAL".into(), self.floats("normals", &mesh.normals, VERTICES)?.into());
+        attributes.insert(
+            "NORMAL".into(),
+            self.floats("normals", &mesh.normals, VERTICES)?.into(),
+        );
         if textured {
-            attributes.insert("TANGENT".into(), self.floats("tangents", &mesh.tangents, VERTICES)?.into());
-            attributes.insert("TEXCOORD_0".into(), self.floats("uv", &mesh.uv, VERTICES)?.into());
+            attributes.insert(
+                "TANGENT".into(),
+                self.floats("tangents", &mesh.tangents, VERTICES)?.into(),
+            );
+            attributes.insert(
+                "TEXCOORD_0".into(),
+                self.floats("uv", &mesh.uv, VERTICES)?.into(),
+            );
         }
         let view = self.view("triangles", bytemuck::cast_slice(&mesh.triangles), ELEMENTS);
         let indices = self.accessor(view, U16, "SCALAR", mesh.triangles.len(), "triangles");
@@ -134,9 +162,13 @@ impl Builder {
 
     /// The baked pictures, as textures 0 and 1.
     fn pictures(&mut self, baked: &Baked) -> [usize; 2] {
-        for (name, bytes) in [("carpaint.baked.f0", &baked.f0), ("carpaint.baked.normals", &baked.normals)] {
+        for (name, bytes) in [
+            ("carpaint.baked.f0", &baked.f0),
+            ("carpaint.baked.normals", &baked.normals),
+        ] {
             let view = self.view(name, bytes, None);
-            self.images.push(json!({ "name": name, "mimeType": "image/png", "bufferView": view }));
+            self.images
+                .push(json!({ "name": name, "mimeType": "image/png", "bufferView": view }));
         }
         [0, 1]
     }
@@ -146,27 +178,64 @@ impl Builder {
         #[allow(clippy::cast_possible_truncation)] // glTF's precision
         let narrow = |v: f64| v as f32;
         let mut lists = Map::new();
-        let nodes: Vec<[f32; 3]> = paint.color_table.nodes().iter().map(|lab| lab.to_rgb().map(narrow)).collect();
-        lists.insert("color_table".into(), self.floats("carpaint.color_table", &nodes, None)?.into());
-        let Some(flakes) = &paint.flakes else { return Ok(lists) };
-        let view = self.view("carpaint.flakes.offsets", bytemuck::cast_slice(&flakes.offsets), None);
-        let offsets = self.accessor(view, U32, "SCALAR", flakes.offsets.len(), "carpaint.flakes.offsets");
+        let nodes: Vec<[f32; 3]> = paint
+            .color_table
+            .nodes()
+            .iter()
+            .map(|lab| lab.to_rgb().map(narrow))
+            .collect();
+        lists.insert(
+            "color_table".into(),
+            self.floats("carpaint.color_table", &nodes, None)?.into(),
+        );
+        let Some(flakes) = &paint.flakes else {
+            return Ok(lists);
+        };
+        let view = self.view(
+            "carpaint.flakes.offsets",
+            bytemuck::cast_slice(&flakes.offsets),
+            None,
+        );
+        let offsets = self.accessor(
+            view,
+            U32,
+            "SCALAR",
+            flakes.offsets.len(),
+            "carpaint.flakes.offsets",
+        );
         lists.insert("offsets".into(), offsets.into());
         let probability: Vec<[f32; 1]> = flakes.probability.iter().map(|&p| [narrow(p)]).collect();
-        lists.insert("probability".into(), self.floats("carpaint.flakes.probability", &probability, None)?.into());
-        lists.insert("lower".into(), self.floats("carpaint.flakes.lower", &flakes.lower, None)?.into());
-        lists.insert("upper".into(), self.floats("carpaint.flakes.upper", &flakes.upper, None)?.into());
+        lists.insert(
+            "probability".into(),
+            self.floats("carpaint.flakes.probability", &probability, None)?
+                .into(),
+        );
+        lists.insert(
+            "lower".into(),
+            self.floats("carpaint.flakes.lower", &flakes.lower, None)?
+                .into(),
+        );
+        lists.insert(
+            "upper".into(),
+            self.floats("carpaint.flakes.upper", &flakes.upper, None)?
+                .into(),
+        );
         Ok(lists)
     }
 }
 
 fn bounds(positions: &[[f32; 3]], pick: fn(f32, f32) -> f32) -> Vec<f32> {
-    (0..3).filter_map(|k| positions.iter().map(|p| p[k]).reduce(pick)).collect()
+    (0..3)
+        .filter_map(|k| positions.iter().map(|p| p[k]).reduce(pick))
+        .collect()
 }
 
 /// The two chunks behind their header; JSON is padded with spaces, the body with zeros.
 fn chunks(document: &[u8], body: &[u8]) -> Vec<u8> {
-    let (json_length, body_length) = (document.len().next_multiple_of(4), body.len().next_multiple_of(4));
+    let (json_length, body_length) = (
+        document.len().next_multiple_of(4),
+        body.len().next_multiple_of(4),
+    );
     let total = 12 + 8 + json_length + 8 + body_length;
     let word = |n: usize| u32::try_from(n).unwrap_or(u32::MAX).to_le_bytes();
     let mut out = Vec::with_capacity(total);
@@ -190,7 +259,9 @@ mod tests {
     use crate::export::made_up::{about, metallic};
 
     fn parse(bytes: &[u8]) -> (Value, &[u8]) {
-        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")) as usize;
+        let word = |at: usize| {
+            u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")) as usize
+        };
         assert_eq!(&bytes[..4], b"glTF");
         assert_eq!((word(4), word(8)), (2, bytes.len()));
         let length = word(12);
@@ -217,12 +288,14 @@ mod tests {
         let bytes = glb(&paint, &about(), &ExportSettings::default()).expect("written");
         let (document, body) = parse(&bytes);
         let carpaint = &document["materials"][0]["extras"]["carpaint"];
-        let index = |value: &Value| usize::try_from(value.as_u64().expect("an index")).expect("small");
+        let index =
+            |value: &Value| usize::try_from(value.as_u64().expect("an index")).expect("small");
         let accessor = &document["accessors"][index(&carpaint["flakes"]["upper"])];
         assert_eq!(accessor["name"], "carpaint.flakes.upper");
         let view = &document["bufferViews"][index(&accessor["bufferView"])];
         let at = index(&view["byteOffset"]);
-        let upper: Vec<[f32; 3]> = bytemuck::pod_collect_to_vec(&body[at..at + index(&view["byteLength"])]);
+        let upper: Vec<[f32; 3]> =
+            bytemuck::pod_collect_to_vec(&body[at..at + index(&view["byteLength"])]);
         assert_eq!(upper, paint.flakes.as_ref().expect("flakes").upper);
         assert_eq!(carpaint["report"]["weights"][0], 1.0);
         assert!(carpaint["loss"]["median"].as_f64().expect("a number") < 5.0);
@@ -230,10 +303,16 @@ mod tests {
 
     #[test]
     fn a_solid_color_is_a_material_without_textures() {
-        let paint = CarPaint { flakes: None, ..metallic(1, 1, 1) };
+        let paint = CarPaint {
+            flakes: None,
+            ..metallic(1, 1, 1)
+        };
         let bytes = glb(&paint, &about(), &ExportSettings::default()).expect("written");
         let (document, _) = parse(&bytes);
-        assert!(document.get("images").is_none() && document["materials"][0].get("normalTexture").is_none());
+        assert!(
+            document.get("images").is_none()
+                && document["materials"][0].get("normalTexture").is_none()
+        );
     }
 
     #[test]

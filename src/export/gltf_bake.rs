@@ -11,7 +11,9 @@ use super::ExportError;
 use super::gltf_brdf::GltfMaterial;
 use super::png_file::png;
 use crate::color::LinearRgb;
-use crate::paint::{Chi, Direction, FlakeSampler, Flakes, RandomTexture, Reflectance, TexelDraw, instrument_pairs};
+use crate::paint::{
+    Chi, Direction, FlakeSampler, Flakes, RandomTexture, Reflectance, TexelDraw, instrument_pairs,
+};
 
 /// Largest F0 of a texel: beyond it a mirror does not go.
 const BRIGHTEST: f64 = 0.98;
@@ -58,7 +60,10 @@ pub(super) fn bake(
     for (k, &cell) in cells.iter().enumerate() {
         // Cells are wider than texels: most repeat the texel beside or above.
         let beside = (k % width > 0).then(|| k - 1);
-        let known = [beside, k.checked_sub(width)].into_iter().flatten().find(|&at| cells[at] == cell);
+        let known = [beside, k.checked_sub(width)]
+            .into_iter()
+            .flatten()
+            .find(|&at| cells[at] == cell);
         all.push(known.map_or_else(|| facet(cell), |at| all[at]));
     }
     let peak = all.iter().flat_map(|f| f.f0).fold(1e-6_f32, f32::max);
@@ -73,10 +78,17 @@ pub(super) fn bake(
         }
     }
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0..=255
-    let normals: Vec<u8> = all.iter().flat_map(|f| f.normal.map(|v| (127.5 + 127.5 * v).round() as u8)).collect();
+    let normals: Vec<u8> = all
+        .iter()
+        .flat_map(|f| f.normal.map(|v| (127.5 + 127.5 * v).round() as u8))
+        .collect();
     #[allow(clippy::cast_precision_loss)] // a tile's texels
     let mean = sum.map(|s| s / all.len() as f64);
-    let sample = all.iter().step_by(all.len().div_ceil(64).max(1)).map(|f| f.normal.map(f64::from)).collect();
+    let sample = all
+        .iter()
+        .step_by(all.len().div_ceil(64).max(1))
+        .map(|f| f.normal.map(f64::from))
+        .collect();
     let height = tile.height() as usize;
     Ok(Baked {
         f0: png(width, height, &pixels, ExtendedColorType::Rgb8)?,
@@ -95,11 +107,17 @@ fn facets<'a>(
 ) -> impl Fn(u32) -> Facet + 'a {
     let (wi, wo) = instrument_pairs()[BAKED_GEOMETRY];
     let terms = reflectance.terms(wi, wo, Chi::Table);
-    let half = terms.map_or([0.0; 2], |t| [t.half.theta_h.to_degrees(), t.half.theta_d.to_degrees()]);
+    let half = terms.map_or([0.0; 2], |t| {
+        [t.half.theta_h.to_degrees(), t.half.theta_d.to_degrees()]
+    });
     // On the nearest slice itself a draw is one draw, not a mixture of four.
     let nearest = |grid: &crate::paint::AngleGrid, angle: f64| {
         let bracket = grid.bracket(angle);
-        let index = if bracket.fraction < 0.5 { bracket.low } else { bracket.high };
+        let index = if bracket.fraction < 0.5 {
+            bracket.low
+        } else {
+            bracket.high
+        };
         #[allow(clippy::cast_possible_truncation)] // angles at texel precision
         let angle = grid.degrees()[index] as f32;
         (index, angle)
@@ -109,7 +127,12 @@ fn facets<'a>(
     let mean = flakes.slice(row, column).mean();
     let transmission = terms.map_or(1.0, |t| t.transmission);
     // The lobe alone, without diffuse and coat.
-    let lobe = GltfMaterial { base_color: [0.0; 3], clearcoat: 0.0, ..*material }.evaluate(wi, wo);
+    let lobe = GltfMaterial {
+        base_color: [0.0; 3],
+        clearcoat: 0.0,
+        ..*material
+    }
+    .evaluate(wi, wo);
     let gain: [f64; 3] = lobe.map(|s| transmission / s.max(1e-5));
     let sampler = FlakeSampler::new(flakes);
     let slope = (TILT_SHARE * material.roughness.powi(2)).min(TILT_MAX);
@@ -120,7 +143,10 @@ fn facets<'a>(
             let relative = (1.0 + gain[k] * (f64::from(color[k]) - mean[k])).max(DARKEST);
             (f0[k] * relative).min(BRIGHTEST) as f32
         });
-        Facet { f0, normal: tilted(cell, slope) }
+        Facet {
+            f0,
+            normal: tilted(cell, slope),
+        }
     }
 }
 
@@ -146,10 +172,24 @@ struct SrgbCurve {
 
 impl SrgbCurve {
     fn new() -> Self {
-        let encode = |v: f64| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-        let decode = |s: f64| if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) };
+        let encode = |v: f64| {
+            if v <= 0.003_130_8 {
+                12.92 * v
+            } else {
+                1.055 * v.powf(1.0 / 2.4) - 0.055
+            }
+        };
+        let decode = |s: f64| {
+            if s <= 0.040_45 {
+                s / 12.92
+            } else {
+                ((s + 0.055) / 1.055).powf(2.4)
+            }
+        };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within 0..=255
-        let bytes = (0..4096_u32).map(|k| (255.0 * encode((f64::from(k) / 4095.0).powi(2))).round() as u8).collect();
+        let bytes = (0..4096_u32)
+            .map(|k| (255.0 * encode((f64::from(k) / 4095.0).powi(2))).round() as u8)
+            .collect();
         #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // 0..=255
         let light = std::array::from_fn(|k| decode(k as f64 / 255.0) as f32);
         Self { bytes, light }
@@ -175,11 +215,20 @@ mod tests {
         let reflectance = Reflectance::new(&paint);
         let (material, _) = fit(&reflectance);
         let f0 = dielectric_f0(material.ior, material.specular_color);
-        let baked = bake(&reflectance, paint.flakes.as_ref().expect("flakes"), &material, f0).expect("baked");
+        let baked = bake(
+            &reflectance,
+            paint.flakes.as_ref().expect("flakes"),
+            &material,
+            f0,
+        )
+        .expect("baked");
         let picture = image::load_from_memory(&baked.f0).expect("a PNG").to_rgb8();
         let curve = SrgbCurve::new();
         for k in 0..3 {
-            let sum: f64 = picture.pixels().map(|p| f64::from(curve.light[usize::from(p.0[k])])).sum();
+            let sum: f64 = picture
+                .pixels()
+                .map(|p| f64::from(curve.light[usize::from(p.0[k])]))
+                .sum();
             let mean = sum / f64::from(picture.width() * picture.height());
             assert!((mean * baked.f0_factor[k] / f0[k] - 1.0).abs() < 1e-9);
         }

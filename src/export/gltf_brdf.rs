@@ -81,7 +81,12 @@ impl Cosines {
             return None;
         }
         let half = crate::paint::half_angles(wi, wo);
-        Some(Self { n_l: wi[2], n_v: wo[2], v_h: half.h_o, sine2_h: half.tan2_h * half.h_z * half.h_z })
+        Some(Self {
+            n_l: wi[2],
+            n_v: wo[2],
+            v_h: half.h_o,
+            sine2_h: half.tan2_h * half.h_z * half.h_z,
+        })
     }
 }
 
@@ -100,7 +105,14 @@ impl GltfMaterial {
         let mut fr = f0.map(|f| self.specular * (f + (1.0 - f) * grazing));
         let mut conductor = self.base_color.map(|f| f + (1.0 - f) * grazing);
         if self.iridescence > 0.0 && self.iridescence_thickness_nm > 0.0 {
-            let film = |f0| thin_film(self.iridescence_ior, self.iridescence_thickness_nm, c.n_v, f0);
+            let film = |f0| {
+                thin_film(
+                    self.iridescence_ior,
+                    self.iridescence_thickness_nm,
+                    c.n_v,
+                    f0,
+                )
+            };
             fr = mix(fr, film(f0.map(|f| self.specular * f)), self.iridescence);
             if self.metallic > 0.0 {
                 conductor = mix(conductor, film(self.base_color), self.iridescence);
@@ -109,8 +121,11 @@ impl GltfMaterial {
         let below = 1.0 - fr[0].max(fr[1]).max(fr[2]);
         let coat_fresnel = 0.04 + 0.96 * (1.0 - c.n_v).max(0.0).powi(5);
         let coat_weight = self.clearcoat * coat_fresnel;
-        let coat =
-            if coat_weight > 0.0 { specular(self.clearcoat_roughness * self.clearcoat_roughness, c) } else { 0.0 };
+        let coat = if coat_weight > 0.0 {
+            specular(self.clearcoat_roughness * self.clearcoat_roughness, c)
+        } else {
+            0.0
+        };
         std::array::from_fn(|k| {
             let dielectric = below * self.base_color[k] / PI + fr[k] * lobe;
             let base = dielectric + (conductor[k] * lobe - dielectric) * self.metallic;
@@ -184,9 +199,13 @@ pub(super) fn thin_film(ior: f64, thickness_nm: f64, cosine: f64, f0: LinearRgb)
 fn sensitivity(path_nm: f64, shift: [f64; 3]) -> LinearRgb {
     let phase = 2.0 * PI * path_nm * 1e-9;
     let bump = |height: f64, position: f64, variance: f64, shift: f64| {
-        height * (2.0 * PI * variance).sqrt() * (position * phase + shift).cos() * (-phase * phase * variance).exp()
+        height
+            * (2.0 * PI * variance).sqrt()
+            * (position * phase + shift).cos()
+            * (-phase * phase * variance).exp()
     };
-    let x = bump(5.4856e-13, 1.6810e6, 4.3278e9, shift[0]) + bump(9.7470e-14, 2.2399e6, 4.5282e9, shift[0]);
+    let x = bump(5.4856e-13, 1.6810e6, 4.3278e9, shift[0])
+        + bump(9.7470e-14, 2.2399e6, 4.5282e9, shift[0]);
     let y = bump(4.4201e-13, 1.7953e6, 9.3046e9, shift[1]);
     let z = bump(5.2481e-13, 2.2084e6, 6.6121e9, shift[2]);
     let xyz = [x, y, z].map(|v| v / 1.0685e-7);
@@ -206,8 +225,8 @@ mod tests {
     /// How the numbers were made stands in the file.
     #[test]
     fn the_khronos_sample_renderer_shades_the_same() {
-        let oracle: Value =
-            serde_json::from_str(include_str!("../../tests/oracle/gltf_brdf.json")).expect("an oracle of numbers");
+        let oracle: Value = serde_json::from_str(include_str!("../../tests/oracle/gltf_brdf.json"))
+            .expect("an oracle of numbers");
         let cases = oracle["cases"].as_array().expect("cases");
         assert_eq!(cases.len(), 160);
         for case in cases {
@@ -239,12 +258,18 @@ mod tests {
     /// renderer weighs by channel, so the number is worked from the extension's formula.
     #[test]
     fn a_colored_fresnel_term_takes_its_largest_channel_from_the_base() {
-        let material =
-            GltfMaterial { base_color: [0.5; 3], specular_color: [12.5, 0.0, 0.0], ..GltfMaterial::default() };
+        let material = GltfMaterial {
+            base_color: [0.5; 3],
+            specular_color: [12.5, 0.0, 0.0],
+            ..GltfMaterial::default()
+        };
         let f = material.evaluate([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
         // α = 1: D = V = 1/π and 1/4; F0 = 0.04 · 12.5 = 0.5 in red.
         let (diffuse, lobe) = (0.5 / PI, 0.25 / PI);
-        for (got, want) in f.iter().zip([0.5 * diffuse + 0.5 * lobe, 0.5 * diffuse, 0.5 * diffuse]) {
+        for (got, want) in f
+            .iter()
+            .zip([0.5 * diffuse + 0.5 * lobe, 0.5 * diffuse, 0.5 * diffuse])
+        {
             assert!((got - want).abs() < 1e-12, "{f:?}");
         }
     }

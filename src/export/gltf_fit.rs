@@ -66,10 +66,21 @@ struct Metric {
 impl Metric {
     fn at(lab: Lab) -> Self {
         let chroma = lab.a.hypot(lab.b);
-        let chroma_axis = if chroma > 1e-9 { [lab.a / chroma, lab.b / chroma] } else { [1.0, 0.0] };
+        let chroma_axis = if chroma > 1e-9 {
+            [lab.a / chroma, lab.b / chroma]
+        } else {
+            [1.0, 0.0]
+        };
         let l50 = (lab.l - 50.0).powi(2);
-        let tolerance = [1.0 + 0.015 * l50 / (20.0 + l50).sqrt(), 1.0 + 0.045 * chroma, 1.0 + 0.015 * chroma];
-        Self { chroma_axis, tolerance }
+        let tolerance = [
+            1.0 + 0.015 * l50 / (20.0 + l50).sqrt(),
+            1.0 + 0.045 * chroma,
+            1.0 + 0.015 * chroma,
+        ];
+        Self {
+            chroma_axis,
+            tolerance,
+        }
     }
 
     fn difference(&self, from: Lab, to: Lab) -> [f64; 3] {
@@ -80,10 +91,20 @@ impl Metric {
     }
 }
 
-fn target(reflectance: &Reflectance<'_>, (wi, wo): (Direction, Direction), weight: f64) -> Option<Target> {
+fn target(
+    reflectance: &Reflectance<'_>,
+    (wi, wo): (Direction, Direction),
+    weight: f64,
+) -> Option<Target> {
     let color = reflectance.evaluate(wi, wo, Chi::Table);
     let lab = reflected(color);
-    Cosines::of(wi, wo).map(|cosines| Target { cosines, color, lab, metric: Metric::at(lab), weight })
+    Cosines::of(wi, wo).map(|cosines| Target {
+        cosines,
+        color,
+        lab,
+        metric: Metric::at(lab),
+        weight,
+    })
 }
 
 /// CIELAB of a BRDF value under the instrument's light.
@@ -96,7 +117,10 @@ fn pairs_beside() -> impl Iterator<Item = (Direction, Direction)> {
     [15.0_f64, 65.0].into_iter().flat_map(|light| {
         [15.0, 35.0, 60.0].map(|aspecular| {
             let (light, view) = (light.to_radians(), (light - aspecular).to_radians());
-            ([-light.sin(), 0.0, light.cos()], [view.sin(), 0.0, view.cos()])
+            (
+                [-light.sin(), 0.0, light.cos()],
+                [view.sin(), 0.0, view.cos()],
+            )
         })
     })
 }
@@ -104,9 +128,15 @@ fn pairs_beside() -> impl Iterator<Item = (Direction, Direction)> {
 /// Whether the instrument sees hues that no single color explains.
 fn hue_travels(targets: &[Target]) -> bool {
     let colors = targets.iter().filter(|t| t.weight == 1.0).map(|t| t.lab);
-    let colored: Vec<f64> =
-        colors.filter(|lab| lab.a.hypot(lab.b) > 10.0).map(|lab| lab.b.atan2(lab.a).to_degrees()).collect();
-    colored.iter().any(|x| colored.iter().any(|y| ((x - y + 540.0).rem_euclid(360.0) - 180.0).abs() > HUE_TRAVEL_DEG))
+    let colored: Vec<f64> = colors
+        .filter(|lab| lab.a.hypot(lab.b) > 10.0)
+        .map(|lab| lab.b.atan2(lab.a).to_degrees())
+        .collect();
+    colored.iter().any(|x| {
+        colored
+            .iter()
+            .any(|y| ((x - y + 540.0).rem_euclid(360.0) - 180.0).abs() > HUE_TRAVEL_DEG)
+    })
 }
 
 /// The material, with the loss that it has.
@@ -141,7 +171,12 @@ pub(super) fn loss(
     let both = pairs.map(labs);
     let delta_e2000 = both.map(|(paint, material)| ciede2000(paint, material));
     let delta_e2000_over_normals = normals.map(|normals| {
-        std::array::from_fn(|k| ciede2000(both[k].0, reflected(over_normals(material, pairs[k], normals))))
+        std::array::from_fn(|k| {
+            ciede2000(
+                both[k].0,
+                reflected(over_normals(material, pairs[k], normals)),
+            )
+        })
     });
     let mut sorted = delta_e2000;
     sorted.sort_by(f64::total_cmp);
@@ -157,7 +192,11 @@ pub(super) fn loss(
 }
 
 /// Mean of a material over tilted normals, seen as one surface.
-fn over_normals(material: &GltfMaterial, (wi, wo): (Direction, Direction), normals: &[Direction]) -> LinearRgb {
+fn over_normals(
+    material: &GltfMaterial,
+    (wi, wo): (Direction, Direction),
+    normals: &[Direction],
+) -> LinearRgb {
     let mut sum = [0.0; 3];
     for normal in normals {
         let [li, lo] = [wi, wo].map(|w| in_frame(*normal, w));
@@ -210,7 +249,9 @@ impl Problem for Fitting<'_> {
         let material = self.material(x);
         out.clear();
         for t in self.targets {
-            let difference = t.metric.difference(t.lab, reflected(material.at(&t.cosines)));
+            let difference = t
+                .metric
+                .difference(t.lab, reflected(material.at(&t.cosines)));
             out.extend(difference.map(|d| d * t.weight.sqrt()));
         }
     }
@@ -226,11 +267,18 @@ impl<'a> Fitting<'a> {
         let lacquer = fixed.clearcoat_roughness.powi(2);
         match layout {
             Layout::Lobe => bounds.push((0.02, 1.0)),
-            Layout::Lacquer => bounds.extend([(2.0 * lacquer, 1.0), (0.5 * lacquer, 1.01 * lacquer)]),
+            Layout::Lacquer => {
+                bounds.extend([(2.0 * lacquer, 1.0), (0.5 * lacquer, 1.01 * lacquer)])
+            }
             Layout::SecondLobe => bounds.extend([(0.02, 1.0), (0.0, 1.0), (0.02, 0.8)]),
             Layout::Film => bounds.extend([(0.02, 1.0), (0.0, 1.0), (1.1, 3.0), (100.0, 1200.0)]),
         }
-        Self { targets, layout, fixed, bounds }
+        Self {
+            targets,
+            layout,
+            fixed,
+            bounds,
+        }
     }
 
     fn material(&self, x: &[f64]) -> GltfMaterial {
@@ -244,10 +292,15 @@ impl<'a> Fitting<'a> {
         match self.layout {
             Layout::Lobe => {}
             Layout::Lacquer => material.clearcoat_roughness = x[7].sqrt(),
-            Layout::SecondLobe => (material.clearcoat, material.clearcoat_roughness) = (x[7], x[8].sqrt()),
+            Layout::SecondLobe => {
+                (material.clearcoat, material.clearcoat_roughness) = (x[7], x[8].sqrt())
+            }
             Layout::Film => {
-                (material.iridescence, material.iridescence_ior, material.iridescence_thickness_nm) =
-                    (x[7], x[8], x[9]);
+                (
+                    material.iridescence,
+                    material.iridescence_ior,
+                    material.iridescence_thickness_nm,
+                ) = (x[7], x[8], x[9]);
             }
         }
         material
@@ -263,15 +316,28 @@ fn clear_coat(reflectance: &Reflectance<'_>) -> (Layout, GltfMaterial) {
         ..GltfMaterial::default()
     };
     if let Some(coat) = paint.coat {
-        let alpha = if coat.is_mirror() { 0.0 } else { coat.roughness };
-        return (Layout::Lobe, with(crate::paint::fresnel(1.0, coat.ior) / 0.04, alpha));
+        let alpha = if coat.is_mirror() {
+            0.0
+        } else {
+            coat.roughness
+        };
+        return (
+            Layout::Lobe,
+            with(crate::paint::fresnel(1.0, coat.ior) / 0.04, alpha),
+        );
     }
-    let lobes = paint.lobes.iter().filter(|lobe| !lobe.is_absent() && lobe.alpha < LACQUER_ALPHA);
-    lobes.min_by(|a, b| a.alpha.total_cmp(&b.alpha)).map_or((Layout::SecondLobe, GltfMaterial::default()), |lobe| {
-        // At the normal a lobe reflects 4 s F0, the clear coat 0.04 of its factor.
-        let albedo = 4.0 * lobe.f0 * crate::color::luminance(lobe.weight);
-        (Layout::Lacquer, with(albedo / 0.04, lobe.alpha))
-    })
+    let lobes = paint
+        .lobes
+        .iter()
+        .filter(|lobe| !lobe.is_absent() && lobe.alpha < LACQUER_ALPHA);
+    lobes.min_by(|a, b| a.alpha.total_cmp(&b.alpha)).map_or(
+        (Layout::SecondLobe, GltfMaterial::default()),
+        |lobe| {
+            // At the normal a lobe reflects 4 s F0, the clear coat 0.04 of its factor.
+            let albedo = 4.0 * lobe.f0 * crate::color::luminance(lobe.weight);
+            (Layout::Lacquer, with(albedo / 0.04, lobe.alpha))
+        },
+    )
 }
 
 /// Starts of the lobe's α.
@@ -286,7 +352,11 @@ fn fit_plain(reflectance: &Reflectance<'_>, targets: &[Target]) -> Candidate {
             Layout::SecondLobe => vec![0.2, 0.5 * alpha],
             Layout::Lobe | Layout::Film => vec![],
         };
-        split(targets, alpha).into_iter().chain([alpha]).chain(rest).collect()
+        split(targets, alpha)
+            .into_iter()
+            .chain([alpha])
+            .chain(rest)
+            .collect()
     });
     best_of(&problem, starts.collect())
 }
@@ -297,7 +367,10 @@ fn split(targets: &[Target], alpha: f64) -> [f64; 6] {
     for k in 0..3 {
         let (mut dd, mut ds, mut ss, mut df, mut sf) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for t in targets {
-            let (d, s) = (std::f64::consts::FRAC_1_PI, super::gltf_brdf::specular(alpha, &t.cosines));
+            let (d, s) = (
+                std::f64::consts::FRAC_1_PI,
+                super::gltf_brdf::specular(alpha, &t.cosines),
+            );
             let w = t.weight / (t.color[k].abs() + 1e-3).powf(4.0 / 3.0);
             dd += w * d * d;
             ds += w * d * s;
@@ -306,7 +379,10 @@ fn split(targets: &[Target], alpha: f64) -> [f64; 6] {
             sf += w * s * t.color[k];
         }
         let determinant = dd * ss - ds * ds;
-        let (mut diffuse, mut f0) = ((df * ss - sf * ds) / determinant, (sf * dd - df * ds) / determinant);
+        let (mut diffuse, mut f0) = (
+            (df * ss - sf * ds) / determinant,
+            (sf * dd - df * ds) / determinant,
+        );
         if !(f0.is_finite() && f0 > 0.0) {
             (diffuse, f0) = (df / dd, 1e-4);
         }
@@ -321,15 +397,24 @@ fn split(targets: &[Target], alpha: f64) -> [f64; 6] {
 
 /// Every start followed a little, the two best of them to their end.
 fn best_of(problem: &Fitting<'_>, starts: Vec<Vec<f64>>) -> Candidate {
-    let mut tried: Vec<(f64, Vec<f64>)> = starts.into_iter().map(|start| minimise(problem, start, 6)).collect();
+    let mut tried: Vec<(f64, Vec<f64>)> = starts
+        .into_iter()
+        .map(|start| minimise(problem, start, 6))
+        .collect();
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
     tried.truncate(2);
     let finished = tried.into_iter().map(|(_, x)| minimise(problem, x, 40));
     let best = finished.min_by(|a, b| a.0.total_cmp(&b.0));
-    best.map_or(Candidate { material: problem.fixed, merit: f64::INFINITY }, |(merit, x)| Candidate {
-        material: problem.material(&x),
-        merit,
-    })
+    best.map_or(
+        Candidate {
+            material: problem.fixed,
+            merit: f64::INFINITY,
+        },
+        |(merit, x)| Candidate {
+            material: problem.material(&x),
+            merit,
+        },
+    )
 }
 
 /// Thicknesses of the film to start from, nanometres: one to three orders of visible light.
@@ -343,7 +428,9 @@ fn fit_film(plain: &Candidate, targets: &[Target]) -> Candidate {
     let starts = THICKNESSES.iter().flat_map(|&thickness| {
         [1.4, 2.0].map(|ior| {
             let colors = m.base_color.into_iter().chain(f0).map(keep);
-            colors.chain([m.roughness.powi(2), 0.4, ior, thickness]).collect()
+            colors
+                .chain([m.roughness.powi(2), 0.4, ior, thickness])
+                .collect()
         })
     });
     best_of(&problem, starts.collect())
@@ -427,12 +514,25 @@ mod tests {
     #[test]
     fn published_paints_are_met() {
         for (name, [diffuse, first, second, third, alpha, f0]) in PUBLISHED {
-            let lobe = |k: usize, weight| Lobe { weight, alpha: alpha[k], f0: f0[k] };
+            let lobe = |k: usize, weight| Lobe {
+                weight,
+                alpha: alpha[k],
+                f0: f0[k],
+            };
             let lobes = vec![lobe(0, first), lobe(1, second), lobe(2, third)];
-            let paint = CarPaint { coat: None, diffuse, lobes, color_table: ColorTable::white(), flakes: None };
+            let paint = CarPaint {
+                coat: None,
+                diffuse,
+                lobes,
+                color_table: ColorTable::white(),
+                flakes: None,
+            };
             let (material, loss) = fit(&Reflectance::new(&paint));
             assert!(loss.median < 3.0 && loss.worst < 10.0, "{name}: {loss:?}");
-            assert!(material.clearcoat > 0.1 && material.clearcoat_roughness < 0.2, "{name} keeps its lacquer");
+            assert!(
+                material.clearcoat > 0.1 && material.clearcoat_roughness < 0.2,
+                "{name} keeps its lacquer"
+            );
         }
     }
 
@@ -457,6 +557,9 @@ mod tests {
         let (still, _) = fit(&Reflectance::new(&metallic(8, 6, 20)));
         assert_eq!(still.iridescence, 0.0);
         let (material, loss) = travelling(2.5);
-        assert!(material.iridescence == 0.0 || loss.median < 12.0, "{loss:?}");
+        assert!(
+            material.iridescence == 0.0 || loss.median < 12.0,
+            "{loss:?}"
+        );
     }
 }

@@ -36,10 +36,15 @@ pub(super) fn material_json(
         });
         extensions.insert("KHR_materials_iridescence".into(), film);
     }
-    let used = ["KHR_materials_clearcoat", "KHR_materials_ior", "KHR_materials_iridescence", "KHR_materials_specular"]
-        .into_iter()
-        .filter(|name| extensions.contains_key(*name))
-        .collect();
+    let used = [
+        "KHR_materials_clearcoat",
+        "KHR_materials_ior",
+        "KHR_materials_iridescence",
+        "KHR_materials_specular",
+    ]
+    .into_iter()
+    .filter(|name| extensions.contains_key(*name))
+    .collect();
     let [r, g, b] = material.base_color;
     let mut json = json!({
         "name": name,
@@ -109,15 +114,30 @@ pub(super) fn extras(
 
 /// What the extras mean; the model's formula is in a texture bundle's `material.json`.
 const DOCUMENTATION: [(&str, &str); 13] = [
-    ("coat", "ior 1 to 4; Beckmann roughness 0 to 1, below 0.001 a mirror; thickness in micrometres, not used"),
-    ("diffuse", "Lambertian albedo before the color table, linear sRGB, 0 to 1000"),
-    ("lobes", "weight s per channel (0 to 1000), Beckmann alpha (0 to 10), Schlick f0 (0 to 1)"),
+    (
+        "coat",
+        "ior 1 to 4; Beckmann roughness 0 to 1, below 0.001 a mirror; thickness in micrometres, not used",
+    ),
+    (
+        "diffuse",
+        "Lambertian albedo before the color table, linear sRGB, 0 to 1000",
+    ),
+    (
+        "lobes",
+        "weight s per channel (0 to 1000), Beckmann alpha (0 to 10), Schlick f0 (0 to 1)",
+    ),
     (
         "color_table",
         "color of diffuse and lobes; nodes: accessor, linear sRGB, theta_d fastest; angles in degrees inside the coat",
     ),
-    ("flakes.offsets", "accessor: first cluster of every slice, theta_d fastest, and one past the last"),
-    ("flakes.probability", "accessor: probability of every cluster, sums to 1 in a slice within 32-bit rounding"),
+    (
+        "flakes.offsets",
+        "accessor: first cluster of every slice, theta_d fastest, and one past the last",
+    ),
+    (
+        "flakes.probability",
+        "accessor: probability of every cluster, sums to 1 in a slice within 32-bit rounding",
+    ),
     (
         "flakes.lower, flakes.upper",
         "accessors: corners of every cluster's box, CIELAB of pi f (D65, 2 degree observer), colors uniform inside",
@@ -130,7 +150,10 @@ const DOCUMENTATION: [(&str, &str); 13] = [
         "flakes.lifetime_deg, persistence_deg",
         "angle over which a slice's correlation falls to one half; angle over which a texel keeps its random number; degrees along theta_h and theta_d",
     ),
-    ("flakes.tile_um", "side of the baked textures on the paint, micrometres: repeat uv so on a mesh of your own"),
+    (
+        "flakes.tile_um",
+        "side of the baked textures on the paint, micrometres: repeat uv so on a mesh of your own",
+    ),
     (
         "loss.delta_e2000",
         "CIEDE2000 between this material, textures averaged, by the BRDF of the glTF specification, and the paint, light at 45 degrees, per aspecular angle",
@@ -139,5 +162,8 @@ const DOCUMENTATION: [(&str, &str); 13] = [
         "loss.delta_e2000_over_normals",
         "the same, averaged over the tilts of the normal texture instead of along the mean normal",
     ),
-    ("report", "what was clamped, blended and warned of on the way"),
+    (
+        "report",
+        "what was clamped, blended and warned of on the way",
+    ),
 ];

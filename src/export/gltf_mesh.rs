@@ -58,10 +58,18 @@ pub(super) fn ball(tile_um: Option<f64>) -> Mesh {
         for column in 0..AROUND {
             // At the poles one of the two triangles has no area.
             if row > 0 {
-                mesh.triangles.extend([at(row, column), at(row + 1, column + 1), at(row, column + 1)]);
+                mesh.triangles.extend([
+                    at(row, column),
+                    at(row + 1, column + 1),
+                    at(row, column + 1),
+                ]);
             }
             if row + 1 < DOWN {
-                mesh.triangles.extend([at(row, column), at(row + 1, column), at(row + 1, column + 1)]);
+                mesh.triangles.extend([
+                    at(row, column),
+                    at(row + 1, column),
+                    at(row + 1, column + 1),
+                ]);
             }
         }
     }
@@ -76,11 +84,18 @@ mod tests {
     fn triangles_face_outwards() {
         let mesh = ball(Some(5120.0));
         for corner in mesh.triangles.chunks(3) {
-            let [a, b, c] =
-                [0, 1, 2].map(|k| mesh.positions[usize::from(corner[k])].map(|v| f64::from(v) / mesh.radius));
-            let (u, v): ([f64; 3], [f64; 3]) =
-                (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
-            let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            let [a, b, c] = [0, 1, 2].map(|k| {
+                mesh.positions[usize::from(corner[k])].map(|v| f64::from(v) / mesh.radius)
+            });
+            let (u, v): ([f64; 3], [f64; 3]) = (
+                std::array::from_fn(|k| b[k] - a[k]),
+                std::array::from_fn(|k| c[k] - a[k]),
+            );
+            let n = [
+                u[1] * v[2] - u[2] * v[1],
+                u[2] * v[0] - u[0] * v[2],
+                u[0] * v[1] - u[1] * v[0],
+            ];
             assert!(n[0] * a[0] + n[1] * a[1] + n[2] * a[2] > 0.0);
         }
     }

@@ -14,7 +14,11 @@ pub(super) trait Problem {
 /// Sum of squares reached, and where.
 pub(super) fn minimise(problem: &impl Problem, mut x: Vec<f64>, steps: u32) -> (f64, Vec<f64>) {
     let n = x.len();
-    let mut free: Vec<f64> = x.iter().zip(problem.bounds()).map(|(&v, &b)| released(v, b)).collect();
+    let mut free: Vec<f64> = x
+        .iter()
+        .zip(problem.bounds())
+        .map(|(&v, &b)| released(v, b))
+        .collect();
     bind(problem, &free, &mut x);
     let mut residuals = Vec::new();
     problem.residuals(&x, &mut residuals);

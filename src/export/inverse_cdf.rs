@@ -26,12 +26,21 @@ pub struct InverseCdf {
 #[must_use]
 pub fn inverse_cdf(probability: &[f64], luminance: &[f64]) -> InverseCdf {
     let mut steps = Vec::with_capacity(STEPS);
-    let [probability_loss, mean_luminance_change] = append(probability, luminance, |cluster| steps.push(cluster));
-    InverseCdf { steps, probability_loss, mean_luminance_change }
+    let [probability_loss, mean_luminance_change] =
+        append(probability, luminance, |cluster| steps.push(cluster));
+    InverseCdf {
+        steps,
+        probability_loss,
+        mean_luminance_change,
+    }
 }
 
 /// Hands out the steps of a slice and returns its two losses.
-pub(super) fn append(probability: &[f64], luminance: &[f64], mut step: impl FnMut(u32)) -> [f64; 2] {
+pub(super) fn append(
+    probability: &[f64],
+    luminance: &[f64],
+    mut step: impl FnMut(u32),
+) -> [f64; 2] {
     #[allow(clippy::cast_precision_loss)] // 500
     let width = 1.0 / STEPS as f64;
     let (mut next, mut cumulative, mut moved) = (0_usize, 0.0, 0.0);
@@ -51,7 +60,11 @@ pub(super) fn append(probability: &[f64], luminance: &[f64], mut step: impl FnMu
         mean += p * y;
         stepped_mean += share * y;
     }
-    let change = if mean.abs() < 1e-6 { 0.0 } else { (stepped_mean - mean) / mean };
+    let change = if mean.abs() < 1e-6 {
+        0.0
+    } else {
+        (stepped_mean - mean) / mean
+    };
     [moved / 2.0, change]
 }
 

@@ -10,7 +10,11 @@ use crate::paint::CarPaint;
 /// # Errors
 ///
 /// [`ExportError`] for a number that is not finite, or more clusters than textures address.
-pub fn material_json(paint: &CarPaint, about: &About, settings: &ExportSettings) -> Result<Vec<u8>, ExportError> {
+pub fn material_json(
+    paint: &CarPaint,
+    about: &About,
+    settings: &ExportSettings,
+) -> Result<Vec<u8>, ExportError> {
     let textures = Textures::of(paint, settings)?;
     document(paint, about, settings, &textures, &Carrier::Inline)
 }

@@ -82,7 +82,11 @@ pub struct ExportSettings {
 
 impl Default for ExportSettings {
     fn default() -> Self {
-        Self { precision: Precision::F16, alias: true, inverse_cdf: true }
+        Self {
+            precision: Precision::F16,
+            alias: true,
+            inverse_cdf: true,
+        }
     }
 }
 

@@ -13,7 +13,8 @@ pub(super) fn png(
     color: ExtendedColorType,
 ) -> Result<Vec<u8>, ExportError> {
     let mut out = Vec::with_capacity(pixels.len() + 1024);
-    let encoder = PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::NoFilter);
+    let encoder =
+        PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::NoFilter);
     let size = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     encoder.write_image(pixels, size(width), size(height), color)?;
     Ok(out)

@@ -75,8 +75,15 @@ impl Textures {
     fn color_table(&mut self, paint: &CarPaint, precision: Precision) -> Result<(), ExportError> {
         let table = &paint.color_table;
         let nodes: Vec<LinearRgb> = table.nodes().iter().map(|lab| lab.to_rgb()).collect();
-        let about = "color of diffuse and lobes by half angle, linear sRGB; column theta_d, row theta_h";
-        self.colors("color_table", table.theta_d().len(), &nodes, precision, about)
+        let about =
+            "color of diffuse and lobes by half angle, linear sRGB; column theta_d, row theta_h";
+        self.colors(
+            "color_table",
+            table.theta_d().len(),
+            &nodes,
+            precision,
+            about,
+        )
     }
 
     /// A table of linear colors. Eight bits of linear light band: such tables stay halves.
@@ -89,28 +96,69 @@ impl Textures {
         about: &'static str,
     ) -> Result<(), ExportError> {
         #[allow(clippy::cast_possible_truncation)] // texel precision
-        let mut planes: [Vec<f32>; 3] = std::array::from_fn(|k| nodes.iter().map(|c| c[k] as f32).collect());
+        let mut planes: [Vec<f32>; 3] =
+            std::array::from_fn(|k| nodes.iter().map(|c| c[k] as f32).collect());
         let height = nodes.len() / width;
         let (bytes, kind) = if precision == Precision::F32 {
             for plane in &planes {
                 finite(name, plane)?;
             }
             let [r, g, b] = &planes;
-            (exr(width, height, &[("B", Plane::Float(b)), ("G", Plane::Float(g)), ("R", Plane::Float(r))]), "f32")
+            (
+                exr(
+                    width,
+                    height,
+                    &[
+                        ("B", Plane::Float(b)),
+                        ("G", Plane::Float(g)),
+                        ("R", Plane::Float(r)),
+                    ],
+                ),
+                "f32",
+            )
         } else {
             let mut half = [const { Vec::new() }; 3];
             for (half, plane) in half.iter_mut().zip(&mut planes) {
                 *half = halves(name, plane, &mut self.clamped)?;
             }
             let [r, g, b] = &half;
-            (exr(width, height, &[("B", Plane::Half(b)), ("G", Plane::Half(g)), ("R", Plane::Half(r))]), "f16")
+            (
+                exr(
+                    width,
+                    height,
+                    &[
+                        ("B", Plane::Half(b)),
+                        ("G", Plane::Half(g)),
+                        ("R", Plane::Half(r)),
+                    ],
+                ),
+                "f16",
+            )
         };
-        self.push(name, "exr", bytes, Entry { width, height, channels: "RGB", kind, scale: None, offset: None, about });
+        self.push(
+            name,
+            "exr",
+            bytes,
+            Entry {
+                width,
+                height,
+                channels: "RGB",
+                kind,
+                scale: None,
+                offset: None,
+                about,
+            },
+        );
         Ok(())
     }
 
     fn push(&mut self, name: &'static str, extension: &str, bytes: Vec<u8>, entry: Entry) {
-        self.list.push(Texture { name, file: format!("{name}.{extension}"), entry, bytes });
+        self.list.push(Texture {
+            name,
+            file: format!("{name}.{extension}"),
+            entry,
+            bytes,
+        });
     }
 
     fn floats(
@@ -123,12 +171,23 @@ impl Textures {
         for (_, plane) in planes {
             finite(name, plane)?;
         }
-        let mut channels: Vec<(&str, Plane<'_>)> = planes.iter().map(|&(c, plane)| (c, Plane::Float(plane))).collect();
+        let mut channels: Vec<(&str, Plane<'_>)> = planes
+            .iter()
+            .map(|&(c, plane)| (c, Plane::Float(plane)))
+            .collect();
         channels.sort_by_key(|(name, _)| *name);
         let height = planes[0].1.len() / width;
         let bytes = exr(width, height, &channels);
         let channels = if planes.len() == 1 { "R" } else { "RG" };
-        let entry = Entry { width, height, channels, kind: "f32", scale: None, offset: None, about };
+        let entry = Entry {
+            width,
+            height,
+            channels,
+            kind: "f32",
+            scale: None,
+            offset: None,
+            about,
+        };
         self.push(name, "exr", bytes, entry);
         Ok(())
     }
@@ -154,12 +213,22 @@ impl Textures {
     fn flakes(&mut self, flakes: &Flakes, settings: &ExportSettings) -> Result<(), ExportError> {
         let clusters = flakes.clusters();
         if clusters > MAX_CLUSTERS {
-            return Err(ExportError::TooMany { what: "clusters", count: clusters, accepted: MAX_CLUSTERS });
+            return Err(ExportError::TooMany {
+                what: "clusters",
+                count: clusters,
+                accepted: MAX_CLUSTERS,
+            });
         }
         let width = cluster_width(clusters);
         let (means, luminances) = means(flakes);
         let about = "mean of every slice in 1/sr, linear sRGB; column theta_d, row theta_h";
-        self.colors("slice_means", flakes.theta_d.len(), &means, settings.precision, about)?;
+        self.colors(
+            "slice_means",
+            flakes.theta_d.len(),
+            &means,
+            settings.precision,
+            about,
+        )?;
         self.slices(flakes)?;
         self.corners(flakes, width, settings.precision)?;
         let mut cumulative = FlakeSampler::new(flakes).cumulative().to_vec();
@@ -178,28 +247,67 @@ impl Textures {
     fn slices(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
         #[allow(clippy::cast_precision_loss)] // below 2^24, exact
         let exact = |n: u32| n as f32;
-        let first: Vec<f32> = flakes.offsets[..flakes.slices()].iter().map(|&o| exact(o)).collect();
-        let count: Vec<f32> = flakes.offsets.windows(2).map(|w| exact(w[1] - w[0])).collect();
+        let first: Vec<f32> = flakes.offsets[..flakes.slices()]
+            .iter()
+            .map(|&o| exact(o))
+            .collect();
+        let count: Vec<f32> = flakes
+            .offsets
+            .windows(2)
+            .map(|w| exact(w[1] - w[0]))
+            .collect();
         let about = "first cluster (R) and number of clusters (G) of every slice; column theta_d, row theta_h";
-        self.floats("slices", flakes.theta_d.len(), &[("R", &first), ("G", &count)], about)
+        self.floats(
+            "slices",
+            flakes.theta_d.len(),
+            &[("R", &first), ("G", &count)],
+            about,
+        )
     }
 
-    fn corners(&mut self, flakes: &Flakes, width: usize, precision: Precision) -> Result<(), ExportError> {
-        let about_lower = "corner of smallest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
-        let about_upper = "corner of largest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
+    fn corners(
+        &mut self,
+        flakes: &Flakes,
+        width: usize,
+        precision: Precision,
+    ) -> Result<(), ExportError> {
+        let about_lower =
+            "corner of smallest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
+        let about_upper =
+            "corner of largest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
         let texels = flakes.clusters().div_ceil(width) * width;
         let height = texels / width;
         let range = Range8::of(flakes);
-        let both = [("corners_lower", &flakes.lower, about_lower), ("corners_upper", &flakes.upper, about_upper)];
+        let both = [
+            ("corners_lower", &flakes.lower, about_lower),
+            ("corners_upper", &flakes.upper, about_upper),
+        ];
         for (name, corners, about) in both {
-            let entry = |kind| Entry { width, height, channels: "RGB", kind, scale: None, offset: None, about };
+            let entry = |kind| Entry {
+                width,
+                height,
+                channels: "RGB",
+                kind,
+                scale: None,
+                offset: None,
+                about,
+            };
             if precision == Precision::Eight {
                 finite(name, corners.as_flattened())?;
                 let (pixels, rounding) = range.quantise(corners, texels);
                 self.corner_rounding_lab = self.corner_rounding_lab.max(rounding);
                 let bytes = png(width, height, &pixels, ExtendedColorType::Rgb8)?;
                 let (scale, offset) = (Some(range.scale), Some(range.offset));
-                self.push(name, "png", bytes, Entry { scale, offset, ..entry("unorm8") });
+                self.push(
+                    name,
+                    "png",
+                    bytes,
+                    Entry {
+                        scale,
+                        offset,
+                        ..entry("unorm8")
+                    },
+                );
                 continue;
             }
             let mut planes: [Vec<f32>; 3] = std::array::from_fn(|k| {
@@ -213,7 +321,11 @@ impl Textures {
                     finite(name, plane)?;
                 }
                 let [l, a, b] = &planes;
-                let channels = [("B", Plane::Float(b)), ("G", Plane::Float(a)), ("R", Plane::Float(l))];
+                let channels = [
+                    ("B", Plane::Float(b)),
+                    ("G", Plane::Float(a)),
+                    ("R", Plane::Float(l)),
+                ];
                 self.push(name, "exr", exr(width, height, &channels), entry("f32"));
                 continue;
             }
@@ -223,7 +335,11 @@ impl Textures {
                 self.corner_rounding_lab = self.corner_rounding_lab.max(rounding(half, plane));
             }
             let [l, a, b] = &half;
-            let channels = [("B", Plane::Half(b)), ("G", Plane::Half(a)), ("R", Plane::Half(l))];
+            let channels = [
+                ("B", Plane::Half(b)),
+                ("G", Plane::Half(a)),
+                ("R", Plane::Half(l)),
+            ];
             self.push(name, "exr", exr(width, height, &channels), entry("f16"));
         }
         Ok(())
@@ -253,18 +369,26 @@ impl Textures {
         let mut index = vec![0_u16; width * height];
         if flakes.widest_slice() > usize::from(u16::MAX) {
             let accepted = usize::from(u16::MAX);
-            return Err(ExportError::TooMany { what: "clusters in a slice", count: flakes.widest_slice(), accepted });
+            return Err(ExportError::TooMany {
+                what: "clusters in a slice",
+                count: flakes.widest_slice(),
+                accepted,
+            });
         }
         self.inverse_cdf_blocks = blocks;
         self.slice_losses.reserve(slices);
         for k in 0..slices {
             let range = flakes.offsets[k] as usize..flakes.offsets[k + 1] as usize;
             let mut texels = index[k / blocks * width + k % blocks * steps..].iter_mut();
-            let loss = inverse_cdf::append(&flakes.probability[range.clone()], &luminances[range], |cluster| {
-                if let (Some(texel), Ok(cluster)) = (texels.next(), u16::try_from(cluster)) {
-                    *texel = cluster;
-                }
-            });
+            let loss = inverse_cdf::append(
+                &flakes.probability[range.clone()],
+                &luminances[range],
+                |cluster| {
+                    if let (Some(texel), Ok(cluster)) = (texels.next(), u16::try_from(cluster)) {
+                        *texel = cluster;
+                    }
+                },
+            );
             #[allow(clippy::cast_possible_truncation)] // stated to seven digits
             self.slice_losses.push(loss.map(|v| v as f32));
         }
@@ -277,21 +401,49 @@ impl Textures {
             (png(width, height, &pixels, ExtendedColorType::L8)?, "uint8")
         } else {
             // PNG's samples are big-endian, the encoder takes the machine's order.
-            (png(width, height, bytemuck::cast_slice(&index), ExtendedColorType::L16)?, "uint16")
+            (
+                png(
+                    width,
+                    height,
+                    bytemuck::cast_slice(&index),
+                    ExtendedColorType::L16,
+                )?,
+                "uint16",
+            )
         };
-        let entry = Entry { width, height, channels: "R", kind, scale: None, offset: None, about };
+        let entry = Entry {
+            width,
+            height,
+            channels: "R",
+            kind,
+            scale: None,
+            offset: None,
+            about,
+        };
         self.push("inverse_cdf", "png", bytes, entry);
         Ok(())
     }
 
     fn random(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
         let tile = RandomTexture::of(&flakes.texture);
-        let pixels: Vec<u8> = tile.cells().iter().flat_map(|cell| cell.to_le_bytes()).collect();
+        let pixels: Vec<u8> = tile
+            .cells()
+            .iter()
+            .flat_map(|cell| cell.to_le_bytes())
+            .collect();
         let (width, height) = (tile.width() as usize, tile.height() as usize);
         let bytes = png(width, height, &pixels, ExtendedColorType::Rgba8)?;
         let about = "32-bit number of every texel's cell, lowest byte in R, highest in A (read it without \
                      premultiplication or color management); the tile repeats, see carpaint_cell in the shader";
-        let entry = Entry { width, height, channels: "RGBA", kind: "uint8", scale: None, offset: None, about };
+        let entry = Entry {
+            width,
+            height,
+            channels: "RGBA",
+            kind: "uint8",
+            scale: None,
+            offset: None,
+            about,
+        };
         self.push("random", "png", bytes, entry);
         Ok(())
     }
@@ -313,7 +465,8 @@ pub(super) fn means(flakes: &Flakes) -> (Vec<LinearRgb>, Vec<f64>) {
         .map(|k| {
             let slice = flakes.slice_at(k);
             let mut sum = [0.0; 3];
-            for ((p, &lower), &upper) in slice.probability.iter().zip(slice.lower).zip(slice.upper) {
+            for ((p, &lower), &upper) in slice.probability.iter().zip(slice.lower).zip(slice.upper)
+            {
                 let color = mean_color(lower, upper);
                 luminances.push(luminance(color));
                 for c in 0..3 {
@@ -330,7 +483,9 @@ pub(super) fn means(flakes: &Flakes) -> (Vec<LinearRgb>, Vec<f64>) {
 fn rounding(half: &[f16], exact: &[f32]) -> f32 {
     let mut back = vec![0.0_f32; half.len()];
     half.convert_to_f32_slice(&mut back);
-    back.iter().zip(exact).fold(0.0, |worst, (x, y)| f32::max(worst, (x - y).abs()))
+    back.iter()
+        .zip(exact)
+        .fold(0.0, |worst, (x, y)| f32::max(worst, (x - y).abs()))
 }
 
 /// The range of all corners, in 255 steps an axis.
@@ -349,7 +504,10 @@ impl Range8 {
                 high[k] = high[k].max(corner[k]);
             }
         }
-        Self { scale: std::array::from_fn(|k| high[k] - low[k]), offset: low }
+        Self {
+            scale: std::array::from_fn(|k| high[k] - low[k]),
+            offset: low,
+        }
     }
 
     fn quantise(&self, corners: &[[f32; 3]], texels: usize) -> (Vec<u8>, f32) {
@@ -357,10 +515,16 @@ impl Range8 {
         let mut pixels = Vec::with_capacity(texels * 3);
         for corner in corners {
             for k in 0..3 {
-                let share = if self.scale[k] > 0.0 { (corner[k] - self.offset[k]) / self.scale[k] } else { 0.0 };
+                let share = if self.scale[k] > 0.0 {
+                    (corner[k] - self.offset[k]) / self.scale[k]
+                } else {
+                    0.0
+                };
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within 0..=255
                 let byte = (share * 255.0).round().clamp(0.0, 255.0) as u8;
-                worst = worst.max((self.offset[k] + self.scale[k] * f32::from(byte) / 255.0 - corner[k]).abs());
+                worst = worst.max(
+                    (self.offset[k] + self.scale[k] * f32::from(byte) / 255.0 - corner[k]).abs(),
+                );
                 pixels.push(byte);
             }
         }

@@ -10,7 +10,9 @@ use super::lobes::{CoatSearch, Shape, fit_shape, unit_of};
 use super::residual::{Judge, Percentiles};
 use crate::color::LinearRgb;
 use crate::measurement::MeasuredBrdf;
-use crate::paint::{CarPaint, Chi, Coat, ColorTable, Direction, FitResiduals, Lobe, MAX_WEIGHT, Reflectance};
+use crate::paint::{
+    CarPaint, Chi, Coat, ColorTable, Direction, FitResiduals, Lobe, MAX_WEIGHT, Reflectance,
+};
 
 /// Samples that the shape is fitted to.
 const SAMPLES: usize = 8000;
@@ -122,7 +124,11 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
     };
     let samples = measure(measured, SAMPLES, cone.min(TRUSTED_DEG), 0xBA5E);
     if samples.len() < LEAST_SAMPLES {
-        return Err(FitError::TooFewSamples { found: samples.len(), asked: SAMPLES, needed: LEAST_SAMPLES });
+        return Err(FitError::TooFewSamples {
+            found: samples.len(),
+            asked: SAMPLES,
+            needed: LEAST_SAMPLES,
+        });
     }
     if !samples.iter().any(|s| s.luminance > 0.0) {
         return Err(FitError::Dark);
@@ -133,14 +139,21 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
     let mut candidates: Vec<Candidate> = Vec::new();
     for search in searches {
         let bare = candidates.first().map(|c| &c.shape);
-        let Some(shape) = fit_shape(&samples, search, unit, bare) else { continue };
-        candidates.push(candidate(measured, frame, shape, &samples, unit, &judge, &floors));
+        let Some(shape) = fit_shape(&samples, search, unit, bare) else {
+            continue;
+        };
+        candidates.push(candidate(
+            measured, frame, shape, &samples, unit, &judge, &floors,
+        ));
     }
     let mut candidates = candidates.into_iter();
     let mut best = candidates.next().ok_or(FitError::NoAnswer)?;
     for other in candidates {
         let gain = best.score - other.score;
-        let clear = other.shape.coat.is_some_and(|(ior, roughness)| roughness <= CLEAR_ROUGHNESS && ior >= CLEAR_IOR);
+        let clear = other
+            .shape
+            .coat
+            .is_some_and(|(ior, roughness)| roughness <= CLEAR_ROUGHNESS && ior >= CLEAR_IOR);
         let needed = match () {
             () if best.worst > AIM => COAT_GAIN_IN_NEED,
             () if clear => COAT_GAIN_IF_CLEAR,
@@ -165,7 +178,9 @@ fn candidate(
     let fitted = fit_color_table(measured, &shape, frame, samples, unit);
     let paint = paint_of(&shape, fitted.table.clone());
     let reflectance = Reflectance::new(&paint);
-    let with = |chi: Chi| judge.luminance_errors(|wi: Direction, wo: Direction| reflectance.evaluate(wi, wo, chi));
+    let with = |chi: Chi| {
+        judge.luminance_errors(|wi: Direction, wo: Direction| reflectance.evaluate(wi, wo, chi))
+    };
     let (full, alone) = (with(Chi::Table), with(Chi::Overall));
     // A floor of nothing (computed data) must not make every error infinite.
     let over = |e: f64, f: f64| (e + 1e-3) / (f + 1e-3);
@@ -179,14 +194,31 @@ fn candidate(
     ];
     let score = ratios.iter().map(|r| r.ln()).sum::<f64>() / 6.0;
     // The lobes alone may err twice and one and a half times as much.
-    let worst = ratios[0].max(ratios[1]).max(AIM * ratios[4] / 1.9).max(AIM * ratios[5] / 1.4);
-    Candidate { shape, table: fitted.table, mapped: fitted.mapped, score, worst }
+    let worst = ratios[0]
+        .max(ratios[1])
+        .max(AIM * ratios[4] / 1.9)
+        .max(AIM * ratios[5] / 1.4);
+    Candidate {
+        shape,
+        table: fitted.table,
+        mapped: fitted.mapped,
+        score,
+        worst,
+    }
 }
 
 fn paint_of(shape: &Shape, color_table: ColorTable) -> CarPaint {
-    let lobe = |&(s, alpha, f0): &(f64, f64, f64)| Lobe { weight: [s; 3], alpha, f0 };
+    let lobe = |&(s, alpha, f0): &(f64, f64, f64)| Lobe {
+        weight: [s; 3],
+        alpha,
+        f0,
+    };
     CarPaint {
-        coat: shape.coat.map(|(ior, roughness)| Coat { ior, roughness, thickness_um: None }),
+        coat: shape.coat.map(|(ior, roughness)| Coat {
+            ior,
+            roughness,
+            thickness_um: None,
+        }),
         diffuse: [shape.diffuse; 3],
         lobes: shape.lobes.iter().map(lobe).collect(),
         color_table,
@@ -196,7 +228,9 @@ fn paint_of(shape: &Shape, color_table: ColorTable) -> CarPaint {
 
 fn finish(best: Candidate, judge: &Judge) -> Result<FittedBase, FitError> {
     let shape = best.shape;
-    for (field, value) in [("diffuse", shape.diffuse)].into_iter().chain(shape.lobes.map(|l| ("a lobe's weight", l.0)))
+    for (field, value) in [("diffuse", shape.diffuse)]
+        .into_iter()
+        .chain(shape.lobes.map(|l| ("a lobe's weight", l.0)))
     {
         if !(0.0..=MAX_WEIGHT).contains(&value) {
             return Err(FitError::NotAReflectance { field, value });
@@ -226,8 +260,21 @@ fn finish(best: Candidate, judge: &Judge) -> Result<FittedBase, FitError> {
             100.0 * all.median, 100.0 * all.p90, 100.0 * all.floor_median, 100.0 * all.floor_p90
         ));
     }
-    let CarPaint { coat, diffuse, lobes, color_table, .. } = paint;
-    Ok(FittedBase { diffuse, lobes, color_table, coat, residuals, warnings })
+    let CarPaint {
+        coat,
+        diffuse,
+        lobes,
+        color_table,
+        ..
+    } = paint;
+    Ok(FittedBase {
+        diffuse,
+        lobes,
+        color_table,
+        coat,
+        residuals,
+        warnings,
+    })
 }
 
 #[cfg(test)]
@@ -245,10 +292,11 @@ mod tests {
 
     /// A number in 0..1 that depends on both directions and nothing else.
     fn noise(wi: Direction, wo: Direction) -> f64 {
-        let bits = wi
-            .iter()
-            .chain(&wo)
-            .fold(0_u64, |h, v| (h ^ v.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29));
+        let bits = wi.iter().chain(&wo).fold(0_u64, |h, v| {
+            (h ^ v.to_bits())
+                .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+                .rotate_left(29)
+        });
         f64::from(u32::try_from(bits >> 40).expect("24 bits")) / f64::from(1_u32 << 24)
     }
 
@@ -269,17 +317,26 @@ mod tests {
         let r = Reflectance::new(&paint);
         let at = |deg: f64| {
             let a = deg.to_radians();
-            crate::color::luminance(r.evaluate([-0.5, 0.0, 0.75_f64.sqrt()], [a.sin(), 0.0, a.cos()], Chi::Table))
+            crate::color::luminance(r.evaluate(
+                [-0.5, 0.0, 0.75_f64.sqrt()],
+                [a.sin(), 0.0, a.cos()],
+                Chi::Table,
+            ))
         };
         [at(30.0), at(-20.0)]
     }
 
     #[test]
     fn flat_data_give_a_diffuse_paint() {
-        let base = fit_base(&From(|_, _| Some([0.1, 0.2, 0.3])), CoatChoice::ByResidual).expect("a fit");
+        let base =
+            fit_base(&From(|_, _| Some([0.1, 0.2, 0.3])), CoatChoice::ByResidual).expect("a fit");
         assert!(base.coat.is_none(), "{base:?}");
         assert!(base.residuals.all.p90 < 5e-3, "{:?}", base.residuals);
-        assert!(base.residuals.instrument.iter().all(|i| i.fit < 0.1), "{:?}", base.residuals);
+        assert!(
+            base.residuals.instrument.iter().all(|i| i.fit < 0.1),
+            "{:?}",
+            base.residuals
+        );
     }
 
     #[test]
@@ -305,12 +362,22 @@ mod tests {
     #[test]
     fn a_million_times_darker_is_the_same_fit_and_brighter_is_no_reflectance() {
         let clean = fit_base(&From(|i, o| Some(satin(i, o))), CoatChoice::Ior(1.0)).expect("a fit");
-        let dim = fit_base(&From(|i, o| Some(satin(i, o).map(|v| v * 1e-6))), CoatChoice::Ior(1.0)).expect("a fit");
+        let dim = fit_base(
+            &From(|i, o| Some(satin(i, o).map(|v| v * 1e-6))),
+            CoatChoice::Ior(1.0),
+        )
+        .expect("a fit");
         for (a, b) in peak_and_flop(&dim).iter().zip(peak_and_flop(&clean)) {
             assert!((1e6 * a / b - 1.0).abs() < 0.05, "{a} {b}");
         }
-        let bright = fit_base(&From(|i, o| Some(satin(i, o).map(|v| v * 1e6))), CoatChoice::Ior(1.0));
-        assert!(matches!(bright, Err(FitError::NotAReflectance { .. })), "{bright:?}");
+        let bright = fit_base(
+            &From(|i, o| Some(satin(i, o).map(|v| v * 1e6))),
+            CoatChoice::Ior(1.0),
+        );
+        assert!(
+            matches!(bright, Err(FitError::NotAReflectance { .. })),
+            "{bright:?}"
+        );
     }
 
     #[test]
@@ -319,51 +386,105 @@ mod tests {
             fit_base(&From(|_, _| None), CoatChoice::ByResidual),
             Err(FitError::TooFewSamples { found: 0, .. })
         ));
-        assert_eq!(fit_base(&From(|_, _| Some([0.0; 3])), CoatChoice::ByResidual), Err(FitError::Dark));
-        assert_eq!(fit_base(&From(|_, _| Some([0.1; 3])), CoatChoice::Ior(0.5)), Err(FitError::Ior(0.5)));
+        assert_eq!(
+            fit_base(&From(|_, _| Some([0.0; 3])), CoatChoice::ByResidual),
+            Err(FitError::Dark)
+        );
+        assert_eq!(
+            fit_base(&From(|_, _| Some([0.1; 3])), CoatChoice::Ior(0.5)),
+            Err(FitError::Ior(0.5))
+        );
         let few = From(|i: Direction, o| (noise(i, o) < 1e-3).then_some([0.1; 3]));
-        assert!(matches!(fit_base(&few, CoatChoice::ByResidual), Err(FitError::TooFewSamples { needed: 200, .. })));
+        assert!(matches!(
+            fit_base(&few, CoatChoice::ByResidual),
+            Err(FitError::TooFewSamples { needed: 200, .. })
+        ));
     }
 
     #[test]
     fn a_mirror_ends_in_a_finite_answer() {
         let mirror = From(|i, o| {
             let h = half_angles(i, o);
-            Some(if h.theta_h < 0.01 { [3000.0; 3] } else { [0.0; 3] })
+            Some(if h.theta_h < 0.01 {
+                [3000.0; 3]
+            } else {
+                [0.0; 3]
+            })
         });
         let base = fit_base(&mirror, CoatChoice::ByResidual).expect("a fit");
         let [peak, flop] = peak_and_flop(&base);
-        assert!(peak.is_finite() && flop.is_finite() && flop < 0.1, "{peak} {flop}");
+        assert!(
+            peak.is_finite() && flop.is_finite() && flop < 0.1,
+            "{peak} {flop}"
+        );
     }
 
     #[test]
     fn a_clear_coat_over_a_metallic_base_is_made_explicit() {
-        let lobe = |s: f64, alpha, f0| Lobe { weight: [s, 0.8 * s, 0.5 * s], alpha, f0 };
+        let lobe = |s: f64, alpha, f0| Lobe {
+            weight: [s, 0.8 * s, 0.5 * s],
+            alpha,
+            f0,
+        };
         let truth = CarPaint {
-            coat: Some(Coat { ior: 1.5, roughness: 0.03, thickness_um: None }),
+            coat: Some(Coat {
+                ior: 1.5,
+                roughness: 0.03,
+                thickness_um: None,
+            }),
             diffuse: [0.05, 0.04, 0.02],
-            lobes: vec![lobe(0.02, 0.12, 0.6), lobe(0.04, 0.25, 0.5), lobe(0.03, 0.5, 0.4)],
+            lobes: vec![
+                lobe(0.02, 0.12, 0.6),
+                lobe(0.04, 0.25, 0.5),
+                lobe(0.03, 0.5, 0.4),
+            ],
             color_table: ColorTable::white(),
             flakes: None,
         };
         let reflectance = Reflectance::new(&truth);
-        let measured =
-            From(|i, o| Some(reflectance.evaluate(i, o, Chi::Table).map(|v| v * (0.95 + 0.1 * noise(i, o)))));
+        let measured = From(|i, o| {
+            Some(
+                reflectance
+                    .evaluate(i, o, Chi::Table)
+                    .map(|v| v * (0.95 + 0.1 * noise(i, o))),
+            )
+        });
         let base = fit_base(&measured, CoatChoice::ByResidual).expect("a fit");
         let coat = base.coat.expect("a coat");
-        assert!((coat.ior - 1.5).abs() < 0.05 && (coat.roughness / 0.03 - 1.0).abs() < 0.05, "{coat:?}");
-        assert!(base.residuals.instrument.iter().all(|i| i.fit < i.floor + 1.0), "{:?}", base.residuals);
+        assert!(
+            (coat.ior - 1.5).abs() < 0.05 && (coat.roughness / 0.03 - 1.0).abs() < 0.05,
+            "{coat:?}"
+        );
+        assert!(
+            base.residuals
+                .instrument
+                .iter()
+                .all(|i| i.fit < i.floor + 1.0),
+            "{:?}",
+            base.residuals
+        );
         let forced = fit_base(&measured, CoatChoice::Ior(1.4)).expect("a fit");
         assert_eq!(forced.coat.expect("a coat").ior, 1.4);
-        assert_eq!(fit_base(&measured, CoatChoice::Ior(1.0)).expect("a fit").coat, None);
+        assert_eq!(
+            fit_base(&measured, CoatChoice::Ior(1.0))
+                .expect("a fit")
+                .coat,
+            None
+        );
     }
 
     #[test]
     fn the_number_of_threads_changes_no_bit() {
         let fit = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("a pool");
             pool.install(|| {
-                fit_base(&From(|i, o| Some(satin(i, o).map(|v| v * (0.8 + 0.4 * noise(i, o))))), CoatChoice::ByResidual)
+                fit_base(
+                    &From(|i, o| Some(satin(i, o).map(|v| v * (0.8 + 0.4 * noise(i, o))))),
+                    CoatChoice::ByResidual,
+                )
             })
         };
         assert_eq!(fit(1).expect("a fit"), fit(3).expect("a fit"));

@@ -60,10 +60,18 @@ pub(super) fn moments(members: &[Texel], light: &[[f32; 4]], more: LinearRgb) ->
     let half = std::array::from_fn(|k| {
         let variance = (second[k] / count - (first[k] / count).powi(2)).max(0.0);
         // A box must not reach beyond the bounds, wherever its mean moves it.
-        (3.0 * variance).sqrt().min((MAX_LAB - mean[k].abs()).max(0.0))
+        (3.0 * variance)
+            .sqrt()
+            .min((MAX_LAB - mean[k].abs()).max(0.0))
     });
-    let center = center_of_mean(half, std::array::from_fn(|k| sum[k] / count + more[k]), mean);
+    let center = center_of_mean(
+        half,
+        std::array::from_fn(|k| sum[k] / count + more[k]),
+        mean,
+    );
     let bound = MAX_LAB as f32;
-    let corner = |sign: f64| std::array::from_fn(|k| ((center[k] + sign * half[k]) as f32).clamp(-bound, bound));
+    let corner = |sign: f64| {
+        std::array::from_fn(|k| ((center[k] + sign * half[k]) as f32).clamp(-bound, bound))
+    };
     (corner(-1.0), corner(1.0))
 }

@@ -35,7 +35,10 @@ pub struct ClusterSettings {
 
 impl Default for ClusterSettings {
     fn default() -> Self {
-        Self { clusters: 50, box_rule: BoxRule::Moments }
+        Self {
+            clusters: 50,
+            box_rule: BoxRule::Moments,
+        }
     }
 }
 
@@ -98,7 +101,10 @@ struct Sums {
 
 impl Sums {
     fn of(texels: &[Texel], origin: &Texel) -> Self {
-        let mut sums = Self { count: texels.len() as f32, ..Self::default() };
+        let mut sums = Self {
+            count: texels.len() as f32,
+            ..Self::default()
+        };
         for texel in texels {
             for k in 0..4 {
                 let d = texel[k] - origin[k];
@@ -149,9 +155,23 @@ struct Node {
 impl Node {
     fn new(from: usize, to: usize, buckets: Option<(usize, usize)>, sums: Sums) -> Self {
         let spreads = [sums.spread(0), sums.spread(1), sums.spread(2)];
-        let axis = (0..3).fold(0, |best, k| if spreads[k] > spreads[best] { k } else { best });
-        let spread = if to - from > 1 { spreads.iter().sum() } else { 0.0 };
-        Self { from, to, buckets, sums, spread, axis }
+        let axis = (0..3).fold(
+            0,
+            |best, k| if spreads[k] > spreads[best] { k } else { best },
+        );
+        let spread = if to - from > 1 {
+            spreads.iter().sum()
+        } else {
+            0.0
+        };
+        Self {
+            from,
+            to,
+            buckets,
+            sums,
+            spread,
+            axis,
+        }
     }
 }
 
@@ -161,7 +181,11 @@ impl Clusterer {
     /// # Errors
     ///
     /// [`NoTexel`] when no pixel is finite.
-    pub fn cluster(&mut self, planes: [&[f32]; 3], settings: &ClusterSettings) -> Result<SliceClusters, NoTexel> {
+    pub fn cluster(
+        &mut self,
+        planes: [&[f32]; 3],
+        settings: &ClusterSettings,
+    ) -> Result<SliceClusters, NoTexel> {
         let pixels = planes[0].len();
         let (dead, beyond) = take_in(planes, &mut self.texels, &mut self.light);
         if self.texels.is_empty() {
@@ -193,7 +217,8 @@ impl Clusterer {
         }
         let mut from = 0;
         for to in ends {
-            self.leaves.push(Node::new(crowd + from, crowd + to, None, Sums::default()));
+            self.leaves
+                .push(Node::new(crowd + from, crowd + to, None, Sums::default()));
             from = to;
         }
         crowd
@@ -233,9 +258,16 @@ impl Clusterer {
         self.leaves.push(bucketed(&starts, &sums, 0, BUCKETS));
         // A run that lost its buckets is split by moving its texels.
         while self.leaves.len() - first < most {
-            let widest = (first..self.leaves.len())
-                .reduce(|best, k| if self.leaves[k].spread > self.leaves[best].spread { k } else { best });
-            let Some(widest) = widest.filter(|k| self.leaves[*k].spread > 0.0) else { break };
+            let widest = (first..self.leaves.len()).reduce(|best, k| {
+                if self.leaves[k].spread > self.leaves[best].spread {
+                    k
+                } else {
+                    best
+                }
+            });
+            let Some(widest) = widest.filter(|k| self.leaves[*k].spread > 0.0) else {
+                break;
+            };
             let node = self.leaves[widest];
             let mean = origin[node.axis] + node.sums.first[node.axis] / node.sums.count;
             let halves = match node.buckets {
@@ -243,13 +275,18 @@ impl Clusterer {
                 _ => None,
             };
             let halves = halves.or_else(|| {
-                let middle = node.from + partition(&mut self.texels[node.from..node.to], node.axis, mean);
+                let middle =
+                    node.from + partition(&mut self.texels[node.from..node.to], node.axis, mean);
                 (middle > node.from && middle < node.to).then(|| {
                     let runs = [node.from..middle, middle..node.to];
                     let fewer = usize::from(runs[1].len() < runs[0].len());
                     let sums = Sums::of(&self.texels[runs[fewer].clone()], &origin);
                     let others = node.sums.without(&sums);
-                    let sums = if fewer == 0 { [sums, others] } else { [others, sums] };
+                    let sums = if fewer == 0 {
+                        [sums, others]
+                    } else {
+                        [others, sums]
+                    };
                     [0, 1].map(|k| Node::new(runs[k].start, runs[k].end, None, sums[k]))
                 })
             });
@@ -270,7 +307,11 @@ impl Clusterer {
         for texel in texels {
             for k in 0..4 {
                 low[k] = if texel[k] < low[k] { texel[k] } else { low[k] };
-                high[k] = if texel[k] > high[k] { texel[k] } else { high[k] };
+                high[k] = if texel[k] > high[k] {
+                    texel[k]
+                } else {
+                    high[k]
+                };
             }
         }
         // Sums about any point in the crowd keep their digits; a sample's mean is such a point.
@@ -282,9 +323,17 @@ impl Clusterer {
                 origin[k] += texel[k] * share;
             }
         }
-        let scale = if high[0] > low[0] { BUCKETS as f32 / (high[0] - low[0]) } else { 0.0 };
+        let scale = if high[0] > low[0] {
+            BUCKETS as f32 / (high[0] - low[0])
+        } else {
+            0.0
+        };
         self.bucket.clear();
-        self.bucket.extend(texels.iter().map(|texel| (((texel[0] - low[0]) * scale) as usize).min(BUCKETS - 1) as u8));
+        self.bucket.extend(
+            texels
+                .iter()
+                .map(|texel| (((texel[0] - low[0]) * scale) as usize).min(BUCKETS - 1) as u8),
+        );
         let mut starts = vec![0_usize; BUCKETS + 1];
         for &bucket in &self.bucket {
             starts[usize::from(bucket) + 1] += 1;
@@ -301,14 +350,18 @@ impl Clusterer {
             *place += 1;
         }
         self.texels[..crowd].copy_from_slice(&self.sorted);
-        let sums = starts.windows(2).map(|w| Sums::of(&self.texels[w[0]..w[1]], &origin)).collect();
+        let sums = starts
+            .windows(2)
+            .map(|w| Sums::of(&self.texels[w[0]..w[1]], &origin))
+            .collect();
         (origin, starts, sums)
     }
 
     /// The leaf around the 99.9th percentile, where it is small.
     fn flat_leaf(&self) -> Option<usize> {
         let sparkle = self.crowd + (SPARKLE * self.texels.len() as f64) as usize;
-        let small = |leaf: &Node| leaf.from <= sparkle && sparkle < leaf.to && leaf.to - leaf.from <= FLAT;
+        let small =
+            |leaf: &Node| leaf.from <= sparkle && sparkle < leaf.to && leaf.to - leaf.from <= FLAT;
         self.leaves.iter().position(small)
     }
 
@@ -343,8 +396,12 @@ impl Clusterer {
         let center = |(_, l, u): &(usize, [f32; 3], [f32; 3])| [0, 1, 2].map(|k| l[k] + u[k]);
         boxes.sort_by(|x, y| {
             let (cx, cy) = (center(x), center(y));
-            let order = |a: &[f32; 3], b: &[f32; 3]| (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne());
-            let order = order(&cx, &cy).or_else(|| order(&x.1, &y.1)).or_else(|| order(&x.2, &y.2));
+            let order = |a: &[f32; 3], b: &[f32; 3]| {
+                (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne())
+            };
+            let order = order(&cx, &cy)
+                .or_else(|| order(&x.1, &y.1))
+                .or_else(|| order(&x.2, &y.2));
             order.unwrap_or(Ordering::Equal)
         });
         boxes.dedup_by(|next, kept| {
@@ -378,7 +435,10 @@ fn bright_groups(count: usize, groups: usize) -> Vec<usize> {
         3..6 => vec![from, to],
         _ => vec![from / 3, from * 2 / 3, from, to],
     };
-    for size in BELOW_SPARKLE.into_iter().take(groups.saturating_sub(ends.len())) {
+    for size in BELOW_SPARKLE
+        .into_iter()
+        .take(groups.saturating_sub(ends.len()))
+    {
         if let Some(end) = ends.last().copied() {
             ends.push(end + (count * size + 2048) / 4096);
         }
@@ -418,7 +478,12 @@ fn split_buckets(starts: &[usize], sums: &[Sums], low: usize, high: usize) -> Op
             best = (gain, Some(k + 1));
         }
     }
-    best.1.map(|k| [bucketed(starts, sums, low, k), bucketed(starts, sums, k, high)])
+    best.1.map(|k| {
+        [
+            bucketed(starts, sums, low, k),
+            bucketed(starts, sums, k, high),
+        ]
+    })
 }
 
 /// Moves the texels below `pivot` on an axis to the front; returns how many they are.
@@ -444,7 +509,10 @@ mod tests {
     use crate::paint::{MAX_LAB, Slice};
     use std::f64::consts::PI;
 
-    fn cluster_by(pixels: &[[f32; 3]], settings: ClusterSettings) -> Result<SliceClusters, NoTexel> {
+    fn cluster_by(
+        pixels: &[[f32; 3]],
+        settings: ClusterSettings,
+    ) -> Result<SliceClusters, NoTexel> {
         let plane = |k: usize| -> Vec<f32> { pixels.iter().map(|p| p[k]).collect() };
         let (red, green, blue) = (plane(0), plane(1), plane(2));
         Clusterer::default().cluster([&red, &green, &blue], &settings)
@@ -458,29 +526,46 @@ mod tests {
         assert!((sum - 1.0).abs() <= f64::EPSILON * n as f64, "{sum}");
         for (lower, upper) in clusters.lower.iter().zip(&clusters.upper) {
             for k in 0..3 {
-                assert!(lower[k] <= upper[k] && f64::from(lower[k].abs().max(upper[k].abs())) <= MAX_LAB);
+                assert!(
+                    lower[k] <= upper[k]
+                        && f64::from(lower[k].abs().max(upper[k].abs())) <= MAX_LAB
+                );
             }
         }
         clusters
     }
 
     fn slice(clusters: &SliceClusters) -> Slice<'_> {
-        Slice { probability: &clusters.probability, lower: &clusters.lower, upper: &clusters.upper }
+        Slice {
+            probability: &clusters.probability,
+            lower: &clusters.lower,
+            upper: &clusters.upper,
+        }
     }
 
     /// Mean of the finite pixels, 1/sr.
     fn mean_of(pixels: &[[f32; 3]]) -> [f64; 3] {
-        let finite: Vec<_> = pixels.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+        let finite: Vec<_> = pixels
+            .iter()
+            .filter(|p| p.iter().all(|v| v.is_finite()))
+            .collect();
         [0, 1, 2].map(|k| finite.iter().map(|p| f64::from(p[k])).sum::<f64>() / finite.len() as f64)
     }
 
     /// Corners round to `f32`: L, a, b to 2^-24 of themselves, light to three times that and the matrix' condition, 5.
     fn assert_mean(clusters: &SliceClusters, pixels: &[[f32; 3]]) {
         let (got, want) = (slice(clusters).mean(), mean_of(pixels));
-        let scale = pixels.iter().flatten().filter(|v| v.is_finite()).fold(0.0, |s, v| s + f64::from(v.abs()));
+        let scale = pixels
+            .iter()
+            .flatten()
+            .filter(|v| v.is_finite())
+            .fold(0.0, |s, v| s + f64::from(v.abs()));
         for k in 0..3 {
             let tolerance = 2e-6 * (scale / pixels.len() as f64) + 1e-9;
-            assert!((got[k] - want[k]).abs() <= tolerance, "{got:?} instead of {want:?}");
+            assert!(
+                (got[k] - want[k]).abs() <= tolerance,
+                "{got:?} instead of {want:?}"
+            );
         }
     }
 
@@ -496,8 +581,13 @@ mod tests {
         let pixel = |k: usize| {
             let lit = if noise(k, salt) < 0.03 { 2.0 } else { 0.01 };
             let light = -lit * noise(k, salt + 1).ln();
-            let tint = if noise(k, salt + 2) < 0.5 { [1.0, 0.8, 0.4] } else { [0.3, 0.7, 1.0] };
-            [0, 1, 2].map(|c| (light * tint[c] + 3e-4 * (noise(k, salt + 3 + c as u64) - 0.5)) as f32)
+            let tint = if noise(k, salt + 2) < 0.5 {
+                [1.0, 0.8, 0.4]
+            } else {
+                [0.3, 0.7, 1.0]
+            };
+            [0, 1, 2]
+                .map(|c| (light * tint[c] + 3e-4 * (noise(k, salt + 3 + c as u64) - 0.5)) as f32)
         };
         (0..count).map(pixel).collect()
     }
@@ -512,10 +602,22 @@ mod tests {
                 sum += clusters.probability[k];
             }
             let at = |axis: usize| {
-                let (low, high) = (f64::from(clusters.lower[k][axis]), f64::from(clusters.upper[k][axis]));
+                let (low, high) = (
+                    f64::from(clusters.lower[k][axis]),
+                    f64::from(clusters.upper[k][axis]),
+                );
                 low + (high - low) * noise(j, 90 + axis as u64)
             };
-            light.push(luminance(Lab { l: at(0), a: at(1), b: at(2) }.to_rgb()) / PI);
+            light.push(
+                luminance(
+                    Lab {
+                        l: at(0),
+                        a: at(1),
+                        b: at(2),
+                    }
+                    .to_rgb(),
+                ) / PI,
+            );
         }
         light.sort_by(f64::total_cmp);
         light
@@ -537,13 +639,19 @@ mod tests {
             light.sort_by(f64::total_cmp);
             let draws = drawn(&clusters, 300_000);
             let sparkle = percentile(&draws, 0.999) / percentile(&light, 0.999);
-            assert!((sparkle - 1.0).abs() < 0.05, "{count}: 99.9th percentile off by {sparkle}");
+            assert!(
+                (sparkle - 1.0).abs() < 0.05,
+                "{count}: 99.9th percentile off by {sparkle}"
+            );
             let spread = |v: &[f64]| {
                 let mean = v.iter().sum::<f64>() / v.len() as f64;
                 (v.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / v.len() as f64).sqrt()
             };
             let spread = spread(&draws) / spread(&light);
-            assert!((spread - 1.0).abs() < 0.02, "{count}: standard deviation off by {spread}");
+            assert!(
+                (spread - 1.0).abs() < 0.02,
+                "{count}: standard deviation off by {spread}"
+            );
         }
     }
 
@@ -552,11 +660,16 @@ mod tests {
         let pixels = sparkling(4096, 7);
         let clusters = cluster(&pixels);
         for axis in 0..3 {
-            let labs = pixels.iter().map(|p| Lab::from_rgb(p.map(|v| f64::from(v) * PI)).to_array()[axis]);
+            let labs = pixels
+                .iter()
+                .map(|p| Lab::from_rgb(p.map(|v| f64::from(v) * PI)).to_array()[axis]);
             let labs: Vec<f64> = labs.collect();
             let mean = labs.iter().sum::<f64>() / labs.len() as f64;
             let want = labs.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / labs.len() as f64;
-            let moments = clusters.probability.iter().zip(clusters.lower.iter().zip(&clusters.upper));
+            let moments = clusters
+                .probability
+                .iter()
+                .zip(clusters.lower.iter().zip(&clusters.upper));
             let (mut first, mut second) = (0.0, 0.0);
             for (p, (lower, upper)) in moments {
                 let (low, high) = (f64::from(lower[axis]), f64::from(upper[axis]));
@@ -565,16 +678,30 @@ mod tests {
             }
             // Boxes keep their members' variance; moving their middles to keep the mean of light changes a little.
             let got = second - first * first;
-            assert!((got / want - 1.0).abs() < 0.02, "axis {axis}: {got} instead of {want}");
+            assert!(
+                (got / want - 1.0).abs() < 0.02,
+                "axis {axis}: {got} instead of {want}"
+            );
         }
     }
 
     #[test]
     fn one_color_is_one_cluster_and_two_are_two() {
         let one = cluster(&[[0.2, 0.1, 0.05]; 4096]);
-        assert_eq!((one.probability.as_slice(), &one.lower), (&[1.0][..], &one.upper));
+        assert_eq!(
+            (one.probability.as_slice(), &one.lower),
+            (&[1.0][..], &one.upper)
+        );
         assert_mean(&one, &[[0.2, 0.1, 0.05]]);
-        let two: Vec<[f32; 3]> = (0..4096).map(|k| if k % 4 == 0 { [0.5; 3] } else { [0.1, 0.1, 0.3] }).collect();
+        let two: Vec<[f32; 3]> = (0..4096)
+            .map(|k| {
+                if k % 4 == 0 {
+                    [0.5; 3]
+                } else {
+                    [0.1, 0.1, 0.3]
+                }
+            })
+            .collect();
         let clusters = cluster(&two);
         assert_eq!(clusters.probability, [0.75, 0.25]);
         assert_mean(&clusters, &two);
@@ -585,7 +712,9 @@ mod tests {
         let black = cluster(&[[0.0; 3]; 4096]);
         assert_eq!(black.probability, [1.0]);
         assert!(slice(&black).mean().iter().all(|v| v.abs() < 1e-9));
-        let noise: Vec<[f32; 3]> = (0..4096).map(|k| [0, 1, 2].map(|c| (2e-4 * (noise(k, c) - 0.6)) as f32)).collect();
+        let noise: Vec<[f32; 3]> = (0..4096)
+            .map(|k| [0, 1, 2].map(|c| (2e-4 * (noise(k, c) - 0.6)) as f32))
+            .collect();
         let clusters = cluster(&noise);
         assert!(mean_of(&noise)[0] < 0.0);
         assert_mean(&clusters, &noise);
@@ -615,7 +744,10 @@ mod tests {
         assert_mean(&clusters, &pixels);
         let dead = cluster_by(&[[f32::NAN; 3]; 9], ClusterSettings::default());
         assert_eq!(dead, Err(NoTexel { pixels: 9 }));
-        assert_eq!(cluster_by(&[], ClusterSettings::default()), Err(NoTexel { pixels: 0 }));
+        assert_eq!(
+            cluster_by(&[], ClusterSettings::default()),
+            Err(NoTexel { pixels: 0 })
+        );
     }
 
     #[test]
@@ -633,7 +765,10 @@ mod tests {
     fn any_number_of_clusters_keeps_the_mean() {
         let pixels = sparkling(4096, 5);
         for clusters in [1, 2, 5, 14, 15, 25, 30, 39, 50, 100, 400, 4096] {
-            let settings = ClusterSettings { clusters, ..ClusterSettings::default() };
+            let settings = ClusterSettings {
+                clusters,
+                ..ClusterSettings::default()
+            };
             let found = cluster_by(&pixels, settings).expect("has texels");
             assert!(found.probability.len() <= clusters, "{clusters}");
             assert_mean(&found, &pixels);
@@ -643,14 +778,22 @@ mod tests {
     #[test]
     fn tight_boxes_hold_every_texel() {
         let pixels = sparkling(1000, 9);
-        let settings = ClusterSettings { box_rule: BoxRule::Tight, ..ClusterSettings::default() };
+        let settings = ClusterSettings {
+            box_rule: BoxRule::Tight,
+            ..ClusterSettings::default()
+        };
         let clusters = cluster_by(&pixels, settings).expect("has texels");
         for pixel in &pixels {
             let lab = Lab::from_rgb(pixel.map(|v| f64::from(v) * PI)).to_array();
             let inside = |(lower, upper): (&[f32; 3], &[f32; 3])| {
-                (0..3).all(|k| (f64::from(lower[k]) - 1e-2..=f64::from(upper[k]) + 1e-2).contains(&lab[k]))
+                (0..3).all(|k| {
+                    (f64::from(lower[k]) - 1e-2..=f64::from(upper[k]) + 1e-2).contains(&lab[k])
+                })
             };
-            assert!(clusters.lower.iter().zip(&clusters.upper).any(inside), "{lab:?}");
+            assert!(
+                clusters.lower.iter().zip(&clusters.upper).any(inside),
+                "{lab:?}"
+            );
         }
     }
 
@@ -658,12 +801,19 @@ mod tests {
     fn clusters_ascend_in_lightness_and_room_used_before_changes_nothing() {
         let (first, second) = (sparkling(4096, 1), sparkling(2000, 2));
         let mut room = Clusterer::default();
-        let planes = |p: &[[f32; 3]]| [0, 1, 2].map(|k| p.iter().map(|v| v[k]).collect::<Vec<f32>>());
+        let planes =
+            |p: &[[f32; 3]]| [0, 1, 2].map(|k| p.iter().map(|v| v[k]).collect::<Vec<f32>>());
         let (a, b) = (planes(&first), planes(&second));
         let settings = ClusterSettings::default();
-        let alone = room.cluster(b.each_ref().map(Vec::as_slice), &settings).expect("has texels");
-        room.cluster(a.each_ref().map(Vec::as_slice), &settings).expect("has texels");
-        assert_eq!(room.cluster(b.each_ref().map(Vec::as_slice), &settings), Ok(alone.clone()));
+        let alone = room
+            .cluster(b.each_ref().map(Vec::as_slice), &settings)
+            .expect("has texels");
+        room.cluster(a.each_ref().map(Vec::as_slice), &settings)
+            .expect("has texels");
+        assert_eq!(
+            room.cluster(b.each_ref().map(Vec::as_slice), &settings),
+            Ok(alone.clone())
+        );
         let light = |k: usize| alone.lower[k][0] + alone.upper[k][0];
         assert!((1..alone.probability.len()).all(|k| light(k - 1) <= light(k)));
     }

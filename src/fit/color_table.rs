@@ -19,14 +19,17 @@ use super::directions::{Sample, Stream, TRUSTED_DEG};
 use super::lobes::{DARK, Shape};
 use crate::color::{Lab, LinearRgb, ciede2000, luminance};
 use crate::measurement::{MeasuredBrdf, half_frame_pair};
-use crate::paint::{AngleGrid, ColorTable, Direction, fresnel, half_angles, instrument_pairs, refract};
+use crate::paint::{
+    AngleGrid, ColorTable, Direction, fresnel, half_angles, instrument_pairs, refract,
+};
 
 const THETA_H: [f64; 31] = [
-    0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.5, 9.0, 10.5, 12.5, 15.0, 17.5, 20.0, 22.5, 26.0, 30.0, 34.0,
-    37.5, 42.0, 46.0, 50.0, 55.0, 60.0, 65.0, 70.0, 80.0, 90.0,
+    0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.5, 9.0, 10.5, 12.5, 15.0, 17.5, 20.0, 22.5,
+    26.0, 30.0, 34.0, 37.5, 42.0, 46.0, 50.0, 55.0, 60.0, 65.0, 70.0, 80.0, 90.0,
 ];
 const THETA_D: [f64; 20] = [
-    0.0, 3.0, 7.5, 10.0, 14.0, 18.0, 22.5, 27.5, 32.5, 37.5, 42.0, 47.0, 52.5, 57.0, 61.0, 65.0, 70.0, 75.0, 80.0, 90.0,
+    0.0, 3.0, 7.5, 10.0, 14.0, 18.0, 22.5, 27.5, 32.5, 37.5, 42.0, 47.0, 52.5, 57.0, 61.0, 65.0,
+    70.0, 75.0, 80.0, 90.0,
 ];
 
 /// Beyond this nothing measured is believed.
@@ -82,8 +85,16 @@ fn angles(base: &[f64], instrument: impl Iterator<Item = f64>) -> Vec<f64> {
 
 /// Borders of the cells around grid angles: halfway to the neighbours.
 fn cell(angles: &[f64], k: usize) -> (f64, f64) {
-    let low = if k == 0 { angles[0] } else { f64::midpoint(angles[k - 1], angles[k]) };
-    let high = if k + 1 == angles.len() { angles[k] } else { f64::midpoint(angles[k], angles[k + 1]) };
+    let low = if k == 0 {
+        angles[0]
+    } else {
+        f64::midpoint(angles[k - 1], angles[k])
+    };
+    let high = if k + 1 == angles.len() {
+        angles[k]
+    } else {
+        f64::midpoint(angles[k], angles[k + 1])
+    };
     (low, high)
 }
 
@@ -102,8 +113,18 @@ struct TableProblem<'a> {
 impl TableProblem<'_> {
     #[allow(clippy::cast_precision_loss)] // A few thousand at most.
     /// What was measured in a cell over what the shape reflects there, or over `terms` where they are given.
-    fn cell_samples(&self, h: (f64, f64), d: (f64, f64), seed: u64, terms: Option<Terms>) -> Vec<Ratio> {
-        let count = if terms.is_some() { INSTRUMENT_SAMPLES } else { NODE_SAMPLES };
+    fn cell_samples(
+        &self,
+        h: (f64, f64),
+        d: (f64, f64),
+        seed: u64,
+        terms: Option<Terms>,
+    ) -> Vec<Ratio> {
+        let count = if terms.is_some() {
+            INSTRUMENT_SAMPLES
+        } else {
+            NODE_SAMPLES
+        };
         let mut stream = Stream::new(seed);
         let trusted = TRUSTED_DEG.to_radians().cos();
         let outermost = OUTERMOST_DEG.to_radians().cos();
@@ -115,12 +136,16 @@ impl TableProblem<'_> {
             let phi_d = TAU * k as f64 / count as f64;
             let pair = half_frame_pair(theta_h.to_radians(), theta_d.to_radians(), phi_d);
             let ior = self.shape.coat.map_or(1.0, |c| c.0);
-            let (Some(wi), Some(wo)) = (outside(pair.0, ior), outside(pair.1, ior)) else { continue };
+            let (Some(wi), Some(wo)) = (outside(pair.0, ior), outside(pair.1, ior)) else {
+                continue;
+            };
             let least = wi[2].min(wo[2]);
             if least <= outermost {
                 continue;
             }
-            let Some(sample) = Sample::take(self.measured, wi, wo) else { continue };
+            let Some(sample) = Sample::take(self.measured, wi, wo) else {
+                continue;
+            };
             let weight = if least > trusted { 1.0 } else { OUTER_WEIGHT };
             let terms = terms.unwrap_or_else(|| self.shape.terms(wi, wo));
             out.push(ratio(terms, &sample, weight, self.unit));
@@ -131,21 +156,33 @@ impl TableProblem<'_> {
     fn node(&self, samples: &mut [Ratio], lightness_weight: f64) -> Node {
         let total: f64 = samples.iter().map(|s| s.weight).sum();
         if total < LEAST_WEIGHT {
-            return Node { color: None, mapped: false };
+            return Node {
+                color: None,
+                mapped: false,
+            };
         }
         let color: LinearRgb = std::array::from_fn(|k| weighted_median(samples, |s| s.color[k]));
         if color.iter().all(|v| *v >= 0.0) {
-            return Node { color: Some(color), mapped: false };
+            return Node {
+                color: Some(color),
+                mapped: false,
+            };
         }
         let shape = weighted_median(samples, |s| s.shape);
         let highlight = weighted_median(samples, |s| s.highlight);
         if highlight > 0.1 * shape || shape <= 0.0 {
             // The coat is brighter than the sample there: no color of the base can darken it.
-            return Node { color: Some(color.map(|v| v.max(0.0))), mapped: false };
+            return Node {
+                color: Some(color.map(|v| v.max(0.0))),
+                mapped: false,
+            };
         }
         let seen = color.map(|v| v * shape * PI / self.unit);
         let inside = nearest_in_gamut(seen, lightness_weight);
-        Node { color: Some(inside.map(|v| v * self.unit / (shape * PI))), mapped: true }
+        Node {
+            color: Some(inside.map(|v| v * self.unit / (shape * PI))),
+            mapped: true,
+        }
     }
 }
 
@@ -163,7 +200,12 @@ struct Ratio {
 
 fn ratio((base, transmission, highlight): Terms, sample: &Sample, weight: f64, unit: f64) -> Ratio {
     let base = (base * transmission).max(1e-9 * unit);
-    Ratio { color: sample.rgb.map(|v| (v - highlight) / base), shape: base, highlight, weight }
+    Ratio {
+        color: sample.rgb.map(|v| (v - highlight) / base),
+        shape: base,
+        highlight,
+        weight,
+    }
 }
 
 /// Direction in air of a direction inside; `None` for what is reflected totally or lies below the horizon.
@@ -232,14 +274,22 @@ fn fill(nodes: &[Node], columns: usize) -> Vec<LinearRgb> {
                 if before[r * columns + c].is_some() {
                     continue;
                 }
-                let around = [(r.wrapping_sub(1), c), (r + 1, c), (r, c.wrapping_sub(1)), (r, c + 1)];
+                let around = [
+                    (r.wrapping_sub(1), c),
+                    (r + 1, c),
+                    (r, c.wrapping_sub(1)),
+                    (r, c + 1),
+                ];
                 let known: Vec<LinearRgb> = around
                     .into_iter()
                     .filter(|&(r, c)| r < rows && c < columns)
                     .filter_map(|(r, c)| before[r * columns + c])
                     .collect();
-                let Some(count) = u32::try_from(known.len()).ok().filter(|&n| n > 0) else { continue };
-                let mean = |k: usize| known.iter().map(|rgb| rgb[k]).sum::<f64>() / f64::from(count);
+                let Some(count) = u32::try_from(known.len()).ok().filter(|&n| n > 0) else {
+                    continue;
+                };
+                let mean =
+                    |k: usize| known.iter().map(|rgb| rgb[k]).sum::<f64>() / f64::from(count);
                 colors[r * columns + c] = Some(std::array::from_fn(mean));
             }
         }
@@ -267,20 +317,33 @@ pub(super) fn fit_color_table(
             let inner = (refract(wi, bent), refract(wo, bent));
             let half = half_angles(inner.0, inner.1);
             let measured = if frame == Frame::Air { (wi, wo) } else { inner };
-            (half.theta_h.to_degrees(), half.theta_d.to_degrees(), shape.terms(measured.0, measured.1))
+            (
+                half.theta_h.to_degrees(),
+                half.theta_d.to_degrees(),
+                shape.terms(measured.0, measured.1),
+            )
         })
         .collect();
     let rows = angles(&THETA_H, read.iter().map(|a| a.0));
     let columns = angles(&THETA_D, read.iter().map(|a| a.1));
-    let problem = TableProblem { measured, shape, unit };
+    let problem = TableProblem {
+        measured,
+        shape,
+        unit,
+    };
     let nodes: Vec<Node> = (0..rows.len() * columns.len())
         .into_par_iter()
         .map(|k| {
             let (r, c) = (k / columns.len(), k % columns.len());
-            let here = |a: &&(f64, f64, Terms)| (a.0 - rows[r]).abs() < 1e-5 && (a.1 - columns[c]).abs() < 1e-5;
+            let here = |a: &&(f64, f64, Terms)| {
+                (a.0 - rows[r]).abs() < 1e-5 && (a.1 - columns[c]).abs() < 1e-5
+            };
             let seed = 0x5EED ^ (k as u64).wrapping_mul(0x2545_F491_4F6C_DD1D);
             if let Some(&(_, _, terms)) = read.iter().find(here) {
-                let (h, d) = ((rows[r] - 0.25, rows[r] + 0.25), (columns[c] - 0.25, columns[c] + 0.25));
+                let (h, d) = (
+                    (rows[r] - 0.25, rows[r] + 0.25),
+                    (columns[c] - 0.25, columns[c] + 0.25),
+                );
                 let mut samples = problem.cell_samples(h, d, seed, Some(terms));
                 return problem.node(&mut samples, INSTRUMENT_LIGHTNESS_WEIGHT);
             }
@@ -291,16 +354,25 @@ pub(super) fn fit_color_table(
     let mapped = nodes.iter().filter(|n| n.mapped).count();
     let colors = fill(&nodes, columns.len());
 
-    let mut ratios: Vec<Ratio> = samples.iter().map(|s| ratio(shape.terms(s.wi, s.wo), s, 1.0, unit)).collect();
-    let overall: LinearRgb = std::array::from_fn(|k| weighted_median(&mut ratios, |s| s.color[k]).max(0.0));
+    let mut ratios: Vec<Ratio> = samples
+        .iter()
+        .map(|s| ratio(shape.terms(s.wi, s.wo), s, 1.0, unit))
+        .collect();
+    let overall: LinearRgb =
+        std::array::from_fn(|k| weighted_median(&mut ratios, |s| s.color[k]).max(0.0));
     // The shape was fitted to luminance: the one color must not change it.
     let bright = luminance(overall);
-    let overall = if bright > 1e-6 { overall.map(|v| v / bright) } else { [1.0; 3] };
+    let overall = if bright > 1e-6 {
+        overall.map(|v| v / bright)
+    } else {
+        [1.0; 3]
+    };
 
     let grid = |angles: Vec<f64>| AngleGrid::new(angles).unwrap_or_else(|_| AngleGrid::single());
     let lab = |rgb: &LinearRgb| Lab::from_rgb(rgb.map(|v| v.clamp(0.0, 1e4)));
     let labs: Vec<Lab> = colors.iter().map(lab).collect();
-    let table = ColorTable::new(grid(rows), grid(columns), labs, lab(&overall)).unwrap_or_else(|_| ColorTable::white());
+    let table = ColorTable::new(grid(rows), grid(columns), labs, lab(&overall))
+        .unwrap_or_else(|_| ColorTable::white());
     TableFit { table, mapped }
 }
 
@@ -318,12 +390,19 @@ mod tests {
         for ior in [1.0, 1.25, 1.5, 1.8] {
             let read: Vec<f64> = instrument_pairs()
                 .iter()
-                .map(|&(wi, wo)| half_angles(refract(wi, ior), refract(wo, ior)).theta_h.to_degrees())
+                .map(|&(wi, wo)| {
+                    half_angles(refract(wi, ior), refract(wo, ior))
+                        .theta_h
+                        .to_degrees()
+                })
                 .collect();
             let rows = angles(&THETA_H, read.iter().copied());
             assert!(AngleGrid::new(rows.clone()).is_ok());
             for value in read {
-                assert!(rows.iter().any(|r| (r - value).abs() < 1e-5), "{ior}: {value}");
+                assert!(
+                    rows.iter().any(|r| (r - value).abs() < 1e-5),
+                    "{ior}: {value}"
+                );
             }
         }
     }
@@ -340,7 +419,10 @@ mod tests {
 
     #[test]
     fn gaps_take_their_neighbours_color() {
-        let node = |color| Node { color, mapped: false };
+        let node = |color| Node {
+            color,
+            mapped: false,
+        };
         let nodes = [node(Some([2.0; 3])), node(None), node(None), node(None)];
         assert_eq!(fill(&nodes, 2), vec![[2.0; 3]; 4]);
         assert_eq!(fill(&[node(None)], 1), vec![[1.0; 3]]);

@@ -52,8 +52,15 @@ impl Sample {
 
     /// Measures at these directions; `None` where nothing was measured or the value is not finite.
     pub fn take(measured: &dyn MeasuredBrdf, wi: Direction, wo: Direction) -> Option<Self> {
-        let rgb = measured.reflectance(wi, wo).filter(|rgb| rgb.iter().all(|v| v.is_finite()))?;
-        Some(Self { wi, wo, rgb, luminance: luminance(rgb) })
+        let rgb = measured
+            .reflectance(wi, wo)
+            .filter(|rgb| rgb.iter().all(|v| v.is_finite()))?;
+        Some(Self {
+            wi,
+            wo,
+            rgb,
+            luminance: luminance(rgb),
+        })
     }
 }
 
@@ -92,7 +99,12 @@ fn pairs(count: usize, degrees: f64, seed: u64) -> Vec<(Direction, Direction)> {
 }
 
 /// Measures at `count` pairs of directions within `degrees` of the normal; fewer where nothing was measured.
-pub(super) fn measure(measured: &dyn MeasuredBrdf, count: usize, degrees: f64, seed: u64) -> Vec<Sample> {
+pub(super) fn measure(
+    measured: &dyn MeasuredBrdf,
+    count: usize,
+    degrees: f64,
+    seed: u64,
+) -> Vec<Sample> {
     pairs(count, degrees, seed)
         .into_par_iter()
         .map(|(wi, wo)| Sample::take(measured, wi, wo))
@@ -112,8 +124,15 @@ mod tests {
         assert_eq!(pairs.len(), 4000);
         let cone = 70.0_f64.to_radians().cos() - 1e-12;
         assert!(pairs.iter().all(|(wi, wo)| wi[2] >= cone && wo[2] >= cone));
-        assert!(pairs.iter().all(|(_, wo)| (wo[0].hypot(wo[1]).hypot(wo[2]) - 1.0).abs() < 1e-12));
-        let near = pairs.iter().filter(|(wi, wo)| half_angles(*wi, *wo).theta_h < 5.0_f64.to_radians()).count();
+        assert!(
+            pairs
+                .iter()
+                .all(|(_, wo)| (wo[0].hypot(wo[1]).hypot(wo[2]) - 1.0).abs() < 1e-12)
+        );
+        let near = pairs
+            .iter()
+            .filter(|(wi, wo)| half_angles(*wi, *wo).theta_h < 5.0_f64.to_radians())
+            .count();
         assert!((900..1300).contains(&near), "{near}");
     }
 }

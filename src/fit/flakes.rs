@@ -97,7 +97,10 @@ pub fn fit_flakes(
             pictures.read(k, room)?;
             let planes = room.picture.planes.each_ref().map(Vec::as_slice);
             let clusters = clusterer.cluster(planes, settings);
-            let clusters = clusters.map_err(|source| FlakeFitError::NoTexel { slice: pictures.name(k), source })?;
+            let clusters = clusters.map_err(|source| FlakeFitError::NoTexel {
+                slice: pictures.name(k),
+                source,
+            })?;
             let probed = k < columns || k % columns == column;
             let light = probed.then(|| luminance_of(planes, room.picture.width));
             if progress(done.fetch_add(1, Ordering::Relaxed) + 1, slices).is_break() {
@@ -119,9 +122,16 @@ pub fn fit_flakes(
     };
     let mut flakes = gather(pictures, &fitted, texture);
     flakes.texture = texture_of(&flakes, &fitted, column);
-    let clustering =
-        Clustering { clusters: settings.clusters, box_rule: settings.box_rule.name().to_owned(), w1: None };
-    Ok(FittedFlakes { flakes, clustering, warnings })
+    let clustering = Clustering {
+        clusters: settings.clusters,
+        box_rule: settings.box_rule.name().to_owned(),
+        w1: None,
+    };
+    Ok(FittedFlakes {
+        flakes,
+        clustering,
+        warnings,
+    })
 }
 
 #[derive(Debug)]
@@ -137,7 +147,10 @@ fn luminance_of(planes: [&[f32]; 3], width: usize) -> Luminance {
         let y = luminance([*r, *g, *b].map(f64::from)) as f32;
         if y.is_finite() { y } else { 0.0 }
     };
-    Luminance { width, values: texels.map(value).collect() }
+    Luminance {
+        width,
+        values: texels.map(value).collect(),
+    }
 }
 
 fn gather(pictures: &dyn FlakePictures, fitted: &[FittedSlice], texture: FlakeTexture) -> Flakes {
@@ -151,7 +164,9 @@ fn gather(pictures: &dyn FlakePictures, fitted: &[FittedSlice], texture: FlakeTe
         texture,
     };
     for slice in fitted {
-        flakes.probability.extend_from_slice(&slice.clusters.probability);
+        flakes
+            .probability
+            .extend_from_slice(&slice.clusters.probability);
         flakes.lower.extend_from_slice(&slice.clusters.lower);
         flakes.upper.extend_from_slice(&slice.clusters.upper);
         flakes.offsets.push(flakes.probability.len() as u32);
@@ -162,7 +177,11 @@ fn gather(pictures: &dyn FlakePictures, fitted: &[FittedSlice], texture: FlakeTe
 /// Grain and lifetime from the kept slices; `column` is the kept θd.
 fn texture_of(flakes: &Flakes, fitted: &[FittedSlice], column: usize) -> FlakeTexture {
     let columns = flakes.theta_d.len();
-    let lit: Vec<&Luminance> = fitted.iter().filter_map(|s| s.light.as_ref()).filter(|l| l.mean() > LIT).collect();
+    let lit: Vec<&Luminance> = fitted
+        .iter()
+        .filter_map(|s| s.light.as_ref())
+        .filter(|l| l.mean() > LIT)
+        .collect();
     // Evenly over the lit slices, or the brightest where none is.
     let step = lit.len().div_ceil(GRAIN_SLICES).max(1);
     let mut chosen: Vec<&Luminance> = lit.into_iter().step_by(step).collect();
@@ -174,10 +193,20 @@ fn texture_of(flakes: &Flakes, fitted: &[FittedSlice], column: usize) -> FlakeTe
     let grain_um = grain_texels(&chosen).unwrap_or(0.5) * texel_um;
     let along = |slices: Vec<usize>, angles: &[f64]| -> Lifetime {
         let light = |k: usize| fitted[k].light.as_ref();
-        let measured: Vec<Option<f64>> = slices.iter().map(|k| correlation(light(slices[0])?, light(*k)?)).collect();
-        lifetime(angles, &measured, |k| comonotone(flakes.slice_at(slices[0]), flakes.slice_at(slices[k])))
+        let measured: Vec<Option<f64>> = slices
+            .iter()
+            .map(|k| correlation(light(slices[0])?, light(*k)?))
+            .collect();
+        lifetime(angles, &measured, |k| {
+            comonotone(flakes.slice_at(slices[0]), flakes.slice_at(slices[k]))
+        })
     };
-    let h = along((0..flakes.theta_h.len()).map(|h| h * columns + column).collect(), flakes.theta_h.degrees());
+    let h = along(
+        (0..flakes.theta_h.len())
+            .map(|h| h * columns + column)
+            .collect(),
+        flakes.theta_h.degrees(),
+    );
     let d = along((0..columns).collect(), flakes.theta_d.degrees());
     FlakeTexture {
         texel_um,
@@ -192,13 +221,21 @@ fn warnings(pictures: &dyn FlakePictures, fitted: &[FittedSlice]) -> Vec<String>
     let mut tell = |count: fn(&SliceClusters) -> usize, what: &str| {
         let total: usize = fitted.iter().map(|s| count(&s.clusters)).sum();
         let hit = fitted.iter().filter(|s| count(&s.clusters) > 0).count();
-        let worst = fitted.iter().enumerate().max_by_key(|(k, s)| (count(&s.clusters), std::cmp::Reverse(*k)));
+        let worst = fitted
+            .iter()
+            .enumerate()
+            .max_by_key(|(k, s)| (count(&s.clusters), std::cmp::Reverse(*k)));
         if let (Some((k, slice)), true) = (worst, total > 0) {
             let (name, most) = (pictures.name(k), count(&slice.clusters));
-            warnings.push(format!("{total} pixels in {hit} flake slices {what}; most in {name}: {most}"));
+            warnings.push(format!(
+                "{total} pixels in {hit} flake slices {what}; most in {name}: {most}"
+            ));
         }
     };
     tell(|c| c.dead, "are not finite and were left out");
-    tell(|c| c.beyond, "lie beyond 2000 in L, a or b and were held there");
+    tell(
+        |c| c.beyond,
+        "lie beyond 2000 in L, a or b and were held there",
+    );
     warnings
 }

@@ -33,13 +33,20 @@ impl Luminance {
         let product = |x: &f32, y: &f32| (f64::from(*x) - mean) * (f64::from(*y) - mean);
         let (mut across, mut down) = (0.0, 0.0);
         for row in self.values.chunks_exact(self.width) {
-            across += row.iter().zip(&row[lag..]).map(|(x, y)| product(x, y)).sum::<f64>();
+            across += row
+                .iter()
+                .zip(&row[lag..])
+                .map(|(x, y)| product(x, y))
+                .sum::<f64>();
         }
         for (x, y) in self.values.iter().zip(&self.values[lag * self.width..]) {
             down += product(x, y);
         }
         let (across_pairs, down_pairs) = ((self.width - lag) * height, (height - lag) * self.width);
-        Some(f64::midpoint(across / across_pairs as f64, down / down_pairs as f64))
+        Some(f64::midpoint(
+            across / across_pairs as f64,
+            down / down_pairs as f64,
+        ))
     }
 }
 
@@ -56,9 +63,14 @@ pub(super) fn grain_texels(slices: &[&Luminance]) -> Option<f64> {
     }
     let mut before = 1.0;
     for lag in 1.. {
-        let at_lag: Option<Vec<f64>> = varying.iter().map(|(s, m, v)| Some(s.covariance(*m, lag)? / v)).collect();
+        let at_lag: Option<Vec<f64>> = varying
+            .iter()
+            .map(|(s, m, v)| Some(s.covariance(*m, lag)? / v))
+            .collect();
         // A flake as large as the picture: the picture is all that is known of it.
-        let Some(at_lag) = at_lag else { return Some((lag - 1).max(1) as f64) };
+        let Some(at_lag) = at_lag else {
+            return Some((lag - 1).max(1) as f64);
+        };
         let now = at_lag.iter().sum::<f64>() / at_lag.len() as f64;
         if now < 0.5 {
             return Some((lag - 1) as f64 + (before - 0.5) / (before - now));
@@ -73,7 +85,9 @@ mod tests {
     use super::*;
 
     fn picture(width: usize, value: impl Fn(usize, usize) -> f32) -> Luminance {
-        let values = (0..width * width).map(|k| value(k % width, k / width)).collect();
+        let values = (0..width * width)
+            .map(|k| value(k % width, k / width))
+            .collect();
         Luminance { width, values }
     }
 

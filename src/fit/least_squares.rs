@@ -19,7 +19,13 @@ pub(super) struct Normal {
 
 impl Normal {
     fn new(count: usize, scale: f64) -> Self {
-        Self { count, scale, matrix: vec![0.0; count * count], gradient: vec![0.0; count], cost: 0.0 }
+        Self {
+            count,
+            scale,
+            matrix: vec![0.0; count * count],
+            gradient: vec![0.0; count],
+            cost: 0.0,
+        }
     }
 
     /// Adds one residual and its derivatives by parameter.
@@ -39,7 +45,8 @@ impl Normal {
 
     /// Adds one residual to the cost alone.
     pub fn add_cost(&mut self, residual: f64) {
-        self.cost += 2.0 * self.scale * self.scale * ((1.0 + (residual / self.scale).powi(2)).sqrt() - 1.0);
+        self.cost +=
+            2.0 * self.scale * self.scale * ((1.0 + (residual / self.scale).powi(2)).sqrt() - 1.0);
     }
 }
 
@@ -59,9 +66,19 @@ pub(super) struct Minimum {
 }
 
 /// Descends from `start` in at most `iterations` steps; `scale` is the residual from which errors count linearly.
-pub(super) fn minimise(problem: &impl Problem, start: &[f64], scale: f64, iterations: usize) -> Minimum {
+pub(super) fn minimise(
+    problem: &impl Problem,
+    start: &[f64],
+    scale: f64,
+    iterations: usize,
+) -> Minimum {
     let bounds = problem.bounds();
-    let clamp = |p: Vec<f64>| -> Vec<f64> { p.iter().zip(bounds).map(|(v, b)| v.clamp(b.0, b.1)).collect() };
+    let clamp = |p: Vec<f64>| -> Vec<f64> {
+        p.iter()
+            .zip(bounds)
+            .map(|(v, b)| v.clamp(b.0, b.1))
+            .collect()
+    };
     let mut at = clamp(start.to_vec());
     let n = at.len();
     let mut damping = 1e-2;
@@ -75,7 +92,8 @@ pub(super) fn minimise(problem: &impl Problem, start: &[f64], scale: f64, iterat
         let free: Vec<usize> = (0..n)
             .filter(|&k| {
                 let (low, high) = bounds[k];
-                !((at[k] <= low && sums.gradient[k] > 0.0) || (at[k] >= high && sums.gradient[k] < 0.0))
+                !((at[k] <= low && sums.gradient[k] > 0.0)
+                    || (at[k] >= high && sums.gradient[k] < 0.0))
             })
             .collect();
         let Some(step) = damped_step(&sums, &free, damping) else {
@@ -107,7 +125,10 @@ pub(super) fn minimise(problem: &impl Problem, start: &[f64], scale: f64, iterat
             }
         }
     }
-    Minimum { cost: sums.cost, parameters: at }
+    Minimum {
+        cost: sums.cost,
+        parameters: at,
+    }
 }
 
 /// Solves `(A + μ diag A) d = g` on the free parameters by Cholesky; `None` where it is not positive.
@@ -123,7 +144,11 @@ fn damped_step(sums: &Normal, free: &[usize], damping: f64) -> Option<Vec<f64>> 
             for k in 0..c {
                 v -= l[r * n + k] * l[c * n + k];
             }
-            l[r * n + c] = if r == c { positive_root(v)? } else { v / l[c * n + c] };
+            l[r * n + c] = if r == c {
+                positive_root(v)?
+            } else {
+                v / l[c * n + c]
+            };
         }
     }
     let mut d: Vec<f64> = free.iter().map(|&k| sums.gradient[k]).collect();
@@ -175,23 +200,41 @@ mod tests {
 
     #[test]
     fn finds_what_made_the_data() {
-        let decay = Decay { bounds: [(-9.0, 9.0); 2], outlier: false };
+        let decay = Decay {
+            bounds: [(-9.0, 9.0); 2],
+            outlier: false,
+        };
         let found = minimise(&decay, &[3.0, 1.0], 0.1, 100);
-        assert!((found.parameters[0] - 2.0_f64.ln()).abs() < 1e-6, "{found:?}");
-        assert!((found.parameters[1] - 0.7_f64.ln()).abs() < 1e-6, "{found:?}");
+        assert!(
+            (found.parameters[0] - 2.0_f64.ln()).abs() < 1e-6,
+            "{found:?}"
+        );
+        assert!(
+            (found.parameters[1] - 0.7_f64.ln()).abs() < 1e-6,
+            "{found:?}"
+        );
     }
 
     #[test]
     fn one_outlier_pulls_by_no_more_than_its_share() {
-        let decay = Decay { bounds: [(-9.0, 9.0); 2], outlier: true };
+        let decay = Decay {
+            bounds: [(-9.0, 9.0); 2],
+            outlier: true,
+        };
         let found = minimise(&decay, &[3.0, 1.0], 0.01, 200);
         // The outlier's pull is that of a residual of c = 0.01, spread over 20 points.
-        assert!((found.parameters[0] - 2.0_f64.ln()).abs() < 5e-3, "{found:?}");
+        assert!(
+            (found.parameters[0] - 2.0_f64.ln()).abs() < 5e-3,
+            "{found:?}"
+        );
     }
 
     #[test]
     fn a_bound_that_bites_is_kept_and_the_rest_still_fits() {
-        let decay = Decay { bounds: [(-9.0, 9.0), (-9.0, -1.0)], outlier: false };
+        let decay = Decay {
+            bounds: [(-9.0, 9.0), (-9.0, -1.0)],
+            outlier: false,
+        };
         let found = minimise(&decay, &[0.0, -2.0], 0.1, 100);
         assert_eq!(found.parameters[1], -1.0);
         assert!(found.parameters[0].is_finite() && found.cost.is_finite());

@@ -41,24 +41,46 @@ pub(super) fn correlation(x: &Luminance, y: &Luminance) -> Option<f64> {
 
 /// Lifetime over neighbours at `angles` (the first is the slice itself), whose correlations are `measured`, and whose
 /// comonotone correlations `in_step` computes on demand.
-pub(super) fn lifetime(angles: &[f64], measured: &[Option<f64>], in_step: impl Fn(usize) -> f64) -> Lifetime {
+pub(super) fn lifetime(
+    angles: &[f64],
+    measured: &[Option<f64>],
+    in_step: impl Fn(usize) -> f64,
+) -> Lifetime {
     let offsets: Vec<f64> = angles.iter().map(|a| a - angles[0]).collect();
     // A neighbour that does not vary says nothing; the curve ends there.
     let known = measured.iter().skip(1).take_while(|r| r.is_some()).count();
-    let curve: Vec<f64> = std::iter::once(1.0).chain(measured.iter().skip(1).map_while(|r| *r)).collect();
+    let curve: Vec<f64> = std::iter::once(1.0)
+        .chain(measured.iter().skip(1).map_while(|r| *r))
+        .collect();
     if known == 0 {
-        return Lifetime { lifetime_deg: 90.0, persistence_deg: ENDLESS_DEG };
+        return Lifetime {
+            lifetime_deg: 90.0,
+            persistence_deg: ENDLESS_DEG,
+        };
     }
     let Some(crossing) = half_fall(&offsets, &curve) else {
         // It never falls to half: what is known is how far it fell over the whole range.
         let (last, fell) = (offsets[known], curve[known]);
         let kept = (fell / in_step(known)).clamp(0.0, 1.0);
-        let persistence_deg = if kept < 1.0 { (last / (1.0 - kept)).min(ENDLESS_DEG) } else { ENDLESS_DEG };
-        return Lifetime { lifetime_deg: last, persistence_deg };
+        let persistence_deg = if kept < 1.0 {
+            (last / (1.0 - kept)).min(ENDLESS_DEG)
+        } else {
+            ENDLESS_DEG
+        };
+        return Lifetime {
+            lifetime_deg: last,
+            persistence_deg,
+        };
     };
     // Drawn texels must fall to half between the same neighbours: no others are needed.
-    let upto = offsets.iter().position(|d| *d >= crossing).unwrap_or(known).clamp(1, known);
-    let in_step: Vec<f64> = (0..=upto).map(|k| if k == 0 { 1.0 } else { in_step(k) }).collect();
+    let upto = offsets
+        .iter()
+        .position(|d| *d >= crossing)
+        .unwrap_or(known)
+        .clamp(1, known);
+    let in_step: Vec<f64> = (0..=upto)
+        .map(|k| if k == 0 { 1.0 } else { in_step(k) })
+        .collect();
     let drawn_fall = |persistence: f64| {
         let kept = |k: usize| (1.0 - offsets[k] / persistence).max(0.0) * in_step[k];
         half_fall(&offsets, &(0..=upto).map(kept).collect::<Vec<_>>()).unwrap_or(f64::INFINITY)
@@ -66,9 +88,16 @@ pub(super) fn lifetime(angles: &[f64], measured: &[Option<f64>], in_step: impl F
     let (mut low, mut high) = (crossing / 16.0, ENDLESS_DEG);
     for _ in 0..100 {
         let middle = (low * high).sqrt();
-        if drawn_fall(middle) < crossing { low = middle } else { high = middle }
+        if drawn_fall(middle) < crossing {
+            low = middle
+        } else {
+            high = middle
+        }
     }
-    Lifetime { lifetime_deg: crossing, persistence_deg: (low * high).sqrt() }
+    Lifetime {
+        lifetime_deg: crossing,
+        persistence_deg: (low * high).sqrt(),
+    }
 }
 
 /// Where a curve that begins at 1 falls to one half.
@@ -99,16 +128,24 @@ pub(super) fn comonotone(x: Slice, y: Slice) -> f64 {
         // Rounding may leave a crumb of the last cluster on one side: it is the end of both.
         if left_x <= left_y {
             i += 1;
-            let Some(next) = x.probability.get(i) else { break };
+            let Some(next) = x.probability.get(i) else {
+                break;
+            };
             left_x += next;
         } else {
             j += 1;
-            let Some(next) = y.probability.get(j) else { break };
+            let Some(next) = y.probability.get(j) else {
+                break;
+            };
             left_y += next;
         }
     }
     let scale = ((sum_xx - sum_x * sum_x) * (sum_yy - sum_y * sum_y)).sqrt();
-    if scale > 0.0 { (sum_xy - sum_x * sum_y) / scale } else { 0.0 }
+    if scale > 0.0 {
+        (sum_xy - sum_x * sum_y) / scale
+    } else {
+        0.0
+    }
 }
 
 /// Nodes and weights on 0..1, exact to degree seven.
@@ -121,7 +158,10 @@ const GAUSS: [(f64, f64); 4] = [
 
 /// Relative luminance at a place of the lightness axis of a box.
 fn light(slice: &Slice, cluster: usize, place: f64) -> f64 {
-    let (low, high) = (f64::from(slice.lower[cluster][0]), f64::from(slice.upper[cluster][0]));
+    let (low, high) = (
+        f64::from(slice.lower[cluster][0]),
+        f64::from(slice.upper[cluster][0]),
+    );
     crate::color::expand((low + (high - low) * place + 16.0) / 116.0)
 }
 
@@ -136,8 +176,14 @@ mod tests {
         let measured: Vec<Option<f64>> = angles.iter().map(|a| Some((-a / 4.0).exp())).collect();
         let found = lifetime(&angles, &measured, |_| 1.0);
         // Linear between neighbours half a degree apart: off by h²/8 of the second derivative over the slope.
-        assert!((found.lifetime_deg - 4.0 * std::f64::consts::LN_2).abs() < 0.01, "{found:?}");
-        assert!((found.persistence_deg - 2.0 * found.lifetime_deg).abs() < 1e-6, "{found:?}");
+        assert!(
+            (found.lifetime_deg - 4.0 * std::f64::consts::LN_2).abs() < 0.01,
+            "{found:?}"
+        );
+        assert!(
+            (found.persistence_deg - 2.0 * found.lifetime_deg).abs() < 1e-6,
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -153,7 +199,11 @@ mod tests {
 
     #[test]
     fn a_flake_that_never_goes_dark_lives_as_long_as_the_range() {
-        let found = lifetime(&[10.0, 20.0, 30.0], &[Some(1.0), Some(0.95), Some(0.9)], |_| 1.0);
+        let found = lifetime(
+            &[10.0, 20.0, 30.0],
+            &[Some(1.0), Some(0.95), Some(0.9)],
+            |_| 1.0,
+        );
         assert_eq!(found.lifetime_deg, 20.0);
         assert!((found.persistence_deg - 200.0).abs() < 1e-9);
         let alone = lifetime(&[10.0], &[Some(1.0)], |_| 1.0);
@@ -164,11 +214,21 @@ mod tests {
 
     #[test]
     fn a_slice_is_in_step_with_itself_and_with_its_brighter_self() {
-        let (lower, upper) = ([[0.0_f32; 3], [20.0; 3], [60.0; 3]], [[10.0_f32; 3], [30.0; 3], [90.0; 3]]);
-        let one = Slice { probability: &[0.5, 0.3, 0.2], lower: &lower, upper: &upper };
+        let (lower, upper) = (
+            [[0.0_f32; 3], [20.0; 3], [60.0; 3]],
+            [[10.0_f32; 3], [30.0; 3], [90.0; 3]],
+        );
+        let one = Slice {
+            probability: &[0.5, 0.3, 0.2],
+            lower: &lower,
+            upper: &upper,
+        };
         assert!((comonotone(one, one) - 1.0).abs() < 1e-12);
         let split = [0.5, 0.3 - 1e-17, 0.2 + 1e-17];
-        let other = Slice { probability: &split, ..one };
+        let other = Slice {
+            probability: &split,
+            ..one
+        };
         assert!((comonotone(one, other) - 1.0).abs() < 1e-9);
     }
 }

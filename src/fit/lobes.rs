@@ -81,7 +81,9 @@ struct Geometry {
 fn geometry(wi: Direction, wo: Direction, ior: Option<f64>) -> Geometry {
     let outer = half_angles(wi, wo);
     let spread = |h_z: f64| -4.0 * h_z.ln();
-    let masking = |h: &crate::paint::HalfAngles, i: f64, o: f64| (1.0 / (i * o)).min(2.0 * h.h_z / (h.h_o * i.max(o)));
+    let masking = |h: &crate::paint::HalfAngles, i: f64, o: f64| {
+        (1.0 / (i * o)).min(2.0 * h.h_z / (h.h_o * i.max(o)))
+    };
     let Some(ior) = ior else {
         return Geometry {
             tan2: outer.tan2_h,
@@ -102,7 +104,9 @@ fn geometry(wi: Direction, wo: Direction, ior: Option<f64>) -> Geometry {
         masking: masking(&inner, i[2], o[2]),
         transmission: (1.0 - fresnel(wi[2], ior)) * (1.0 - fresnel(wo[2], ior)),
         coat_tan2: outer.tan2_h,
-        coat_rest: fresnel(outer.h_o, ior) / 4.0 * masking(&outer, wi[2], wo[2]) * spread(outer.h_z).exp(),
+        coat_rest: fresnel(outer.h_o, ior) / 4.0
+            * masking(&outer, wi[2], wo[2])
+            * spread(outer.h_z).exp(),
     }
 }
 
@@ -116,7 +120,9 @@ impl Geometry {
         for k in 0..LOBES {
             let (s, alpha, f0) = (p[1 + 3 * k], p[2 + 3 * k], p[3 + 3 * k].exp());
             let slope = self.tan2 * (-2.0 * alpha).exp();
-            let rest = (s - slope + self.spread - 2.0 * alpha).exp() * self.masking * self.transmission / PI;
+            let rest =
+                (s - slope + self.spread - 2.0 * alpha).exp() * self.masking * self.transmission
+                    / PI;
             let value = rest * (f0 + (1.0 - f0) * self.schlick);
             d[1 + 3 * k] = value;
             d[2 + 3 * k] = value * (2.0 * slope - 2.0);
@@ -182,7 +188,8 @@ impl Problem for LobeProblem<'_> {
                     }
                     if let Some(ior) = ior {
                         let beside = geometry(target.wi, target.wo, Some(ior + step));
-                        row[COAT_IOR] = ((beside.luminance(p, None) + self.epsilon) / model).ln() / step;
+                        row[COAT_IOR] =
+                            ((beside.luminance(p, None) + self.epsilon) / model).ln() / step;
                     }
                 }
                 let error = model.ln() - target.log;
@@ -217,11 +224,19 @@ impl Problem for LobeProblem<'_> {
 }
 
 fn bounds(search: CoatSearch, unit: f64) -> Vec<(f64, f64)> {
-    let least_f0: f64 = if search == CoatSearch::Bare { 0.05 } else { 0.1 };
+    let least_f0: f64 = if search == CoatSearch::Bare {
+        0.05
+    } else {
+        0.1
+    };
     let lift = unit.ln();
     let mut out = vec![(-14.0 + lift, 2.0 + lift)];
     for _ in 0..LOBES {
-        out.extend([(-16.0 + lift, 4.0_f64.ln() + lift), (0.004_f64.ln(), 0.0), (least_f0.ln(), 0.0)]);
+        out.extend([
+            (-16.0 + lift, 4.0_f64.ln() + lift),
+            (0.004_f64.ln(), 0.0),
+            (least_f0.ln(), 0.0),
+        ]);
     }
     if search != CoatSearch::Bare {
         out.push((0.002_f64.ln(), 0.8_f64.ln()));
@@ -243,7 +258,14 @@ const ROUGHNESSES: [[f64; LOBES]; 6] = [
 ];
 
 /// Roughness and index of coats that a descent starts from, beside [`ROUGHNESSES`].
-const COATS: [(f64, f64); 6] = [(0.03, 1.5), (0.08, 1.4), (0.3, 1.3), (0.01, 1.5), (0.5, 1.25), (0.15, 1.5)];
+const COATS: [(f64, f64); 6] = [
+    (0.03, 1.5),
+    (0.08, 1.4),
+    (0.3, 1.3),
+    (0.01, 1.5),
+    (0.5, 1.25),
+    (0.15, 1.5),
+];
 
 /// Parameters in the order of [`Geometry::luminance`].
 fn parameters(shape: &Shape, search: CoatSearch) -> Vec<f64> {
@@ -271,14 +293,24 @@ fn starts_from(bare: &Shape, search: CoatSearch) -> Vec<Vec<f64>> {
     let kept = [under(a), under(b), under(c)];
     [(turned, a.1), (kept, 0.03), (kept, 0.3)]
         .into_iter()
-        .map(|(lobes, roughness)| parameters(&Shape { lobes, coat: Some((1.45, roughness)), ..bare.clone() }, search))
+        .map(|(lobes, roughness)| {
+            parameters(
+                &Shape {
+                    lobes,
+                    coat: Some((1.45, roughness)),
+                    ..bare.clone()
+                },
+                search,
+            )
+        })
         .collect()
 }
 
 fn starts(search: CoatSearch, samples: &[Target], epsilon: f64) -> Vec<Vec<f64>> {
     let mut logs: Vec<f64> = samples.iter().map(|s| s.log).collect();
     logs.sort_by(f64::total_cmp);
-    let at = |share: usize| (logs[(logs.len() - 1) * share / 100].exp() - epsilon).max(epsilon / 10.0);
+    let at =
+        |share: usize| (logs[(logs.len() - 1) * share / 100].exp() - epsilon).max(epsilon / 10.0);
     let (dark, bright) = (at(20), at(95));
     ROUGHNESSES
         .iter()
@@ -287,7 +319,11 @@ fn starts(search: CoatSearch, samples: &[Target], epsilon: f64) -> Vec<Vec<f64>>
             let mut p = vec![(dark * PI).ln()];
             for alpha in alphas {
                 let f0: f64 = 0.3;
-                p.extend([(bright * PI * alpha * alpha / (3.0 * f0)).ln(), alpha.ln(), f0.ln()]);
+                p.extend([
+                    (bright * PI * alpha * alpha / (3.0 * f0)).ln(),
+                    alpha.ln(),
+                    f0.ln(),
+                ]);
             }
             if search != CoatSearch::Bare {
                 p.push(f64::ln(roughness));
@@ -307,13 +343,22 @@ pub(super) fn unit_of(samples: &[Sample]) -> f64 {
     let high = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(0.0);
     let peak = sorted.last().copied().unwrap_or(0.0);
     let typical = if high > 0.0 { high } else { peak };
-    if typical > 0.0 { typical / typical.clamp(1e-2, 1e3) } else { 1.0 }
+    if typical > 0.0 {
+        typical / typical.clamp(1e-2, 1e3)
+    } else {
+        1.0
+    }
 }
 
 /// Fits the luminance of samples; `None` where every descent ended in nonsense.
 ///
 /// A search for a coat also starts from the `bare` shape, where there is one.
-pub(super) fn fit_shape(samples: &[Sample], search: CoatSearch, unit: f64, bare: Option<&Shape>) -> Option<Shape> {
+pub(super) fn fit_shape(
+    samples: &[Sample],
+    search: CoatSearch,
+    unit: f64,
+    bare: Option<&Shape>,
+) -> Option<Shape> {
     let epsilon = DARK * unit;
     let near = NEAR_MIRROR_DEG.to_radians();
     let mut targets: Vec<Target> = samples
@@ -324,7 +369,11 @@ pub(super) fn fit_shape(samples: &[Sample], search: CoatSearch, unit: f64, bare:
                 wi: s.wi,
                 wo: s.wo,
                 log: (s.luminance.max(0.0) + epsilon).ln(),
-                weight: if half.theta_h < near { NEAR_WEIGHT } else { 1.0 },
+                weight: if half.theta_h < near {
+                    NEAR_WEIGHT
+                } else {
+                    1.0
+                },
                 cell: cell_of(half.theta_h.to_degrees(), half.theta_d.to_degrees()),
             }
         })
@@ -339,21 +388,44 @@ pub(super) fn fit_shape(samples: &[Sample], search: CoatSearch, unit: f64, bare:
     let problem = |targets: &[Target]| -> Option<Vec<Geometry>> {
         ior.map(|ior| targets.iter().map(|t| geometry(t.wi, t.wo, ior)).collect())
     };
-    let part: Vec<Target> = targets.iter().step_by((targets.len() / 1500).max(1)).copied().collect();
-    let quick = LobeProblem { samples: &part, fixed: problem(&part), epsilon, bounds: bounds(search, unit) };
-    let whole = LobeProblem { samples: &targets, fixed: problem(&targets), epsilon, bounds: bounds(search, unit) };
+    let part: Vec<Target> = targets
+        .iter()
+        .step_by((targets.len() / 1500).max(1))
+        .copied()
+        .collect();
+    let quick = LobeProblem {
+        samples: &part,
+        fixed: problem(&part),
+        epsilon,
+        bounds: bounds(search, unit),
+    };
+    let whole = LobeProblem {
+        samples: &targets,
+        fixed: problem(&targets),
+        epsilon,
+        bounds: bounds(search, unit),
+    };
 
     let mut starts = starts(search, &targets, epsilon);
     if let Some(bare) = bare {
         starts.extend(starts_from(bare, search));
     }
-    let mut found: Vec<Minimum> = starts.par_iter().map(|p| minimise(&quick, p, ROBUST, 40)).collect();
+    let mut found: Vec<Minimum> = starts
+        .par_iter()
+        .map(|p| minimise(&quick, p, ROBUST, 40))
+        .collect();
     found.retain(|m| m.cost.is_finite());
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let best = found.first()?.cost;
-    let agreeing = found.iter().filter(|m| m.cost <= 1.02 * best + 1e-9).count();
+    let agreeing = found
+        .iter()
+        .filter(|m| m.cost <= 1.02 * best + 1e-9)
+        .count();
     let finalists = distinct(&found, 2);
-    let mut last: Vec<Minimum> = finalists.par_iter().map(|m| minimise(&whole, &m.parameters, ROBUST, 40)).collect();
+    let mut last: Vec<Minimum> = finalists
+        .par_iter()
+        .map(|m| minimise(&whole, &m.parameters, ROBUST, 40))
+        .collect();
     last.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let p = last.first().filter(|m| m.cost.is_finite())?;
     let mut shape = shape_of(p, search, agreeing, starts.len());
@@ -382,7 +454,14 @@ fn shape_of(found: &Minimum, search: CoatSearch, agreeing: usize, starts: usize)
         CoatSearch::Index(ior) => Some((ior, p[COAT_ROUGHNESS].exp())),
         CoatSearch::Free => Some((p[COAT_IOR], p[COAT_ROUGHNESS].exp())),
     };
-    Shape { diffuse: p[0].exp(), lobes, coat, cost: found.cost, agreeing, starts }
+    Shape {
+        diffuse: p[0].exp(),
+        lobes,
+        coat,
+        cost: found.cost,
+        agreeing,
+        starts,
+    }
 }
 
 /// Lobes that nowhere in the samples reach a thousandth of the whole get weight 0.
@@ -403,7 +482,9 @@ fn drop_what_does_not_show(shape: &mut Shape, samples: &[Sample], epsilon: f64) 
 
 /// Samples of nearly equal (θh, θd): 4° in θd, growing steps in θh.
 fn cell_of(theta_h: f64, theta_d: f64) -> (u32, u32) {
-    const EDGES: [f64; 15] = [2., 5., 8., 12., 16., 20., 25., 30., 35., 40., 45., 50., 55., 60., 65.];
+    const EDGES: [f64; 15] = [
+        2., 5., 8., 12., 16., 20., 25., 30., 35., 40., 45., 50., 55., 60., 65.,
+    ];
     let row = EDGES.partition_point(|&e| e <= theta_h);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0..=22.
     let column = (theta_d / 4.0).clamp(0.0, 22.0) as u32;
@@ -446,7 +527,14 @@ mod tests {
 
     fn known(coat: Option<(f64, f64)>) -> Shape {
         let lobes = [(0.05, 0.06, 0.5), (0.1, 0.2, 0.4), (0.08, 0.5, 0.3)];
-        Shape { diffuse: 0.1, lobes, coat, cost: 0.0, agreeing: 0, starts: 0 }
+        Shape {
+            diffuse: 0.1,
+            lobes,
+            coat,
+            cost: 0.0,
+            agreeing: 0,
+            starts: 0,
+        }
     }
 
     fn worst(a: &Shape, b: &Shape, samples: &[Sample]) -> f64 {
@@ -454,7 +542,10 @@ mod tests {
             let (base, transmission, highlight) = s.terms(at.wi, at.wo);
             base * transmission + highlight
         };
-        samples.iter().map(|s| (value(a, s) / value(b, s) - 1.0).abs()).fold(0.0, f64::max)
+        samples
+            .iter()
+            .map(|s| (value(a, s) / value(b, s) - 1.0).abs())
+            .fold(0.0, f64::max)
     }
 
     #[test]
@@ -472,8 +563,14 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_the_luminance() {
-        let g = geometry([0.3, 0.1, 0.9_f64.sqrt()], [-0.1, 0.3, 0.9_f64.sqrt()], Some(1.4));
-        let p: Vec<f64> = vec![-2.0, -1.0, -1.5, -0.7, -2.0, -0.9, -1.0, -3.0, -0.5, -0.2, -1.0];
+        let g = geometry(
+            [0.3, 0.1, 0.9_f64.sqrt()],
+            [-0.1, 0.3, 0.9_f64.sqrt()],
+            Some(1.4),
+        );
+        let p: Vec<f64> = vec![
+            -2.0, -1.0, -1.5, -0.7, -2.0, -0.9, -1.0, -3.0, -0.5, -0.2, -1.0,
+        ];
         let mut row = [0.0; MOST];
         g.luminance(&p, Some(&mut row));
         for k in 0..p.len() {
@@ -484,7 +581,11 @@ mod tests {
             };
             // Central difference of 1e-5: error 1e-10 relative to the third derivative.
             let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
-            assert!((slope - row[k]).abs() < 1e-7 * row[k].abs().max(1e-3), "{k}: {slope} {}", row[k]);
+            assert!(
+                (slope - row[k]).abs() < 1e-7 * row[k].abs().max(1e-3),
+                "{k}: {slope} {}",
+                row[k]
+            );
         }
     }
 }

@@ -26,8 +26,10 @@ struct Heap {
 /// The same flakes with at most `most` clusters in each slice. Slices that have no more stay as they are.
 #[must_use]
 pub fn reduce_clusters(flakes: &Flakes, most: usize) -> Flakes {
-    let slices: Vec<Vec<Boxed>> =
-        (0..flakes.slices()).into_par_iter().map(|k| reduce_slice(&flakes.slice_at(k), most.max(1))).collect();
+    let slices: Vec<Vec<Boxed>> = (0..flakes.slices())
+        .into_par_iter()
+        .map(|k| reduce_slice(&flakes.slice_at(k), most.max(1)))
+        .collect();
     let mut reduced = Flakes {
         theta_h: flakes.theta_h.clone(),
         theta_d: flakes.theta_d.clone(),
@@ -43,13 +45,17 @@ pub fn reduce_clusters(flakes: &Flakes, most: usize) -> Flakes {
             reduced.lower.push(lower);
             reduced.upper.push(upper);
         }
-        reduced.offsets.push(u32::try_from(reduced.probability.len()).unwrap_or(u32::MAX));
+        reduced
+            .offsets
+            .push(u32::try_from(reduced.probability.len()).unwrap_or(u32::MAX));
     }
     reduced
 }
 
 fn reduce_slice(slice: &Slice<'_>, most: usize) -> Vec<Boxed> {
-    let mut heaps: Vec<Heap> = (0..slice.probability.len()).map(|k| Heap::of(slice, k)).collect();
+    let mut heaps: Vec<Heap> = (0..slice.probability.len())
+        .map(|k| Heap::of(slice, k))
+        .collect();
     while heaps.len() > most {
         merge_nearest(&mut heaps, most);
     }
@@ -60,7 +66,8 @@ fn reduce_slice(slice: &Slice<'_>, most: usize) -> Vec<Boxed> {
 impl Heap {
     fn of(slice: &Slice<'_>, k: usize) -> Self {
         let (lower, upper) = (slice.lower[k], slice.upper[k]);
-        let half: [f64; 3] = std::array::from_fn(|a| (f64::from(upper[a]) - f64::from(lower[a])) / 2.0);
+        let half: [f64; 3] =
+            std::array::from_fn(|a| (f64::from(upper[a]) - f64::from(lower[a])) / 2.0);
         Self {
             mass: slice.probability[k],
             center: slice.center(k),
@@ -72,7 +79,12 @@ impl Heap {
 
     /// How much mass moves how far when two become one.
     fn distance(&self, other: &Self) -> f64 {
-        let squared: f64 = self.center.iter().zip(other.center).map(|(c, d)| (c - d) * (c - d)).sum();
+        let squared: f64 = self
+            .center
+            .iter()
+            .zip(other.center)
+            .map(|(c, d)| (c - d) * (c - d))
+            .sum();
         self.mass * other.mass / (self.mass + other.mass).max(f64::MIN_POSITIVE) * squared
     }
 
@@ -81,7 +93,8 @@ impl Heap {
         let share = if mass > 0.0 { other.mass / mass } else { 0.5 };
         let mix = |x: f64, y: f64| x + (y - x) * share;
         let center: [f64; 3] = std::array::from_fn(|a| mix(self.center[a], other.center[a]));
-        let spread = |heap: &Self, a: usize| heap.variance[a] + (heap.center[a] - center[a]).powi(2);
+        let spread =
+            |heap: &Self, a: usize| heap.variance[a] + (heap.center[a] - center[a]).powi(2);
         Self {
             mass,
             center,
@@ -115,9 +128,13 @@ fn merge_nearest(heaps: &mut Vec<Heap>, most: usize) {
         }
         best
     };
-    let mut nearest: Vec<(usize, f64)> = (0..heaps.len()).map(|i| nearest_after(heaps, i)).collect();
+    let mut nearest: Vec<(usize, f64)> =
+        (0..heaps.len()).map(|i| nearest_after(heaps, i)).collect();
     while heaps.len() > most {
-        let Some(i) = (0..heaps.len() - 1).min_by(|&x, &y| nearest[x].1.total_cmp(&nearest[y].1)) else { return };
+        let Some(i) = (0..heaps.len() - 1).min_by(|&x, &y| nearest[x].1.total_cmp(&nearest[y].1))
+        else {
+            return;
+        };
         let j = nearest[i].0.min(heaps.len() - 1);
         let merged = heaps[i].with(&heaps[j]);
         heaps[i] = merged;
@@ -150,8 +167,9 @@ mod tests {
 
     fn flakes(count: u32) -> Flakes {
         let spread = |k: u32, step: u32| f64::from(k * step % 97) as f32;
-        let lower: Vec<[f32; 3]> =
-            (0..count).map(|k| [spread(k, 31), spread(k, 17) - 48.0, spread(k, 53) - 48.0]).collect();
+        let lower: Vec<[f32; 3]> = (0..count)
+            .map(|k| [spread(k, 31), spread(k, 17) - 48.0, spread(k, 53) - 48.0])
+            .collect();
         Flakes {
             theta_h: AngleGrid::single(),
             theta_d: AngleGrid::single(),
@@ -159,7 +177,12 @@ mod tests {
             probability: vec![1.0 / f64::from(count); count as usize],
             upper: lower.iter().map(|l| l.map(|v| v + 3.0)).collect(),
             lower,
-            texture: FlakeTexture { texel_um: 20.0, grain_um: 12.0, lifetime_deg: [4.0; 2], persistence_deg: [8.0; 2] },
+            texture: FlakeTexture {
+                texel_um: 20.0,
+                grain_um: 12.0,
+                lifetime_deg: [4.0; 2],
+                persistence_deg: [8.0; 2],
+            },
         }
     }
 

@@ -19,7 +19,8 @@ use super::lobes::DARK;
 use crate::color::{Lab, LinearRgb, ciede2000, luminance};
 use crate::measurement::{MeasuredBrdf, half_frame_pair};
 use crate::paint::{
-    ASPECULAR_DEG, Direction, FitResiduals, InstrumentError, LuminanceError, half_angles, instrument_pairs, refract,
+    ASPECULAR_DEG, Direction, FitResiduals, InstrumentError, LuminanceError, half_angles,
+    instrument_pairs, refract,
 };
 
 const SAMPLES: usize = 48_000;
@@ -63,7 +64,10 @@ const COLUMNS: usize = 62;
 
 fn scaled(sample: &Sample) -> (f64, f64) {
     let half = sample.half();
-    (half.theta_h.to_degrees() / 0.7, half.theta_d.to_degrees() / 1.5)
+    (
+        half.theta_h.to_degrees() / 0.7,
+        half.theta_d.to_degrees() / 1.5,
+    )
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Clamped to the table of buckets.
@@ -110,7 +114,10 @@ impl Neighbours {
             }
         }
         std::array::from_fn(|k| {
-            let mut logs: Vec<f64> = found.iter().map(|&(_, p)| self.points[p as usize].2[k]).collect();
+            let mut logs: Vec<f64> = found
+                .iter()
+                .map(|&(_, p)| self.points[p as usize].2[k])
+                .collect();
             logs.sort_by(f64::total_cmp);
             percentile(&logs, 50.0).exp()
         })
@@ -119,7 +126,9 @@ impl Neighbours {
 
 /// Percentile of sorted values, linear between them; 0 of none.
 fn percentile(sorted: &[f64], percent: f64) -> f64 {
-    let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return 0.0;
+    };
     let at = f64::from(u32::try_from(last).unwrap_or(u32::MAX)) * percent / 100.0;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0..=last.
     let low = (at as usize).min(last);
@@ -137,7 +146,10 @@ pub(super) struct Percentiles {
 fn percentiles(errors: impl Iterator<Item = f64>) -> Percentiles {
     let mut sorted: Vec<f64> = errors.collect();
     sorted.sort_by(f64::total_cmp);
-    Percentiles { median: percentile(&sorted, 50.0), p90: percentile(&sorted, 90.0) }
+    Percentiles {
+        median: percentile(&sorted, 50.0),
+        p90: percentile(&sorted, 90.0),
+    }
 }
 
 impl Judge {
@@ -152,7 +164,13 @@ impl Judge {
                 let (x, y) = scaled(s);
                 let near = s.half().theta_h < NEAR_MIRROR_DEG.to_radians();
                 let floor = luminance(neighbours.floor(x, y));
-                Tested { wi: s.wi, wo: s.wo, luminance: s.luminance, floor, near }
+                Tested {
+                    wi: s.wi,
+                    wo: s.wo,
+                    luminance: s.luminance,
+                    floor,
+                    near,
+                }
             })
             .collect();
         let instrument = instrument_pairs()
@@ -161,19 +179,45 @@ impl Judge {
             .filter_map(|((wi, wo), aspecular_deg)| {
                 let (wi, wo, scale) = match frame {
                     Frame::Air => (wi, wo, PI),
-                    Frame::Inside(ior) => (refract(wi, ior), refract(wo, ior), PI * transmission_from_air(wi, wo, ior)),
+                    Frame::Inside(ior) => (
+                        refract(wi, ior),
+                        refract(wo, ior),
+                        PI * transmission_from_air(wi, wo, ior),
+                    ),
                 };
                 let read = Lab::from_rgb(Sample::take(measured, wi, wo)?.rgb.map(|v| v * scale));
-                let floor = ciede2000(Lab::from_rgb(ring_median(measured, wi, wo)?.map(|v| v * scale)), read);
-                Some(Instrument { aspecular_deg, wi, wo, scale, read, floor })
+                let floor = ciede2000(
+                    Lab::from_rgb(ring_median(measured, wi, wo)?.map(|v| v * scale)),
+                    read,
+                );
+                Some(Instrument {
+                    aspecular_deg,
+                    wi,
+                    wo,
+                    scale,
+                    read,
+                    floor,
+                })
             })
             .collect();
-        Self { test, instrument, dark: DARK * unit, invalid_share: measured.invalid_share() }
+        Self {
+            test,
+            instrument,
+            dark: DARK * unit,
+            invalid_share: measured.invalid_share(),
+        }
     }
 
     /// Relative luminance errors of a fit away from the mirror direction, and next to it.
-    pub fn luminance_errors(&self, fit: impl Fn(Direction, Direction) -> LinearRgb + Sync) -> [Percentiles; 2] {
-        let errors: Vec<f64> = self.test.par_iter().map(|t| self.error(t, luminance(fit(t.wi, t.wo)))).collect();
+    pub fn luminance_errors(
+        &self,
+        fit: impl Fn(Direction, Direction) -> LinearRgb + Sync,
+    ) -> [Percentiles; 2] {
+        let errors: Vec<f64> = self
+            .test
+            .par_iter()
+            .map(|t| self.error(t, luminance(fit(t.wi, t.wo))))
+            .collect();
         self.split(&errors)
     }
 
@@ -188,13 +232,27 @@ impl Judge {
     }
 
     fn split(&self, errors: &[f64]) -> [Percentiles; 2] {
-        [false, true]
-            .map(|near| percentiles(self.test.iter().zip(errors).filter(|(t, _)| t.near == near).map(|x| *x.1)))
+        [false, true].map(|near| {
+            percentiles(
+                self.test
+                    .iter()
+                    .zip(errors)
+                    .filter(|(t, _)| t.near == near)
+                    .map(|x| *x.1),
+            )
+        })
     }
 
     /// Everything that is kept of a fit.
-    pub fn residuals(&self, fit: impl Fn(Direction, Direction) -> LinearRgb + Sync) -> FitResiduals {
-        let errors: Vec<f64> = self.test.par_iter().map(|t| self.error(t, luminance(fit(t.wi, t.wo)))).collect();
+    pub fn residuals(
+        &self,
+        fit: impl Fn(Direction, Direction) -> LinearRgb + Sync,
+    ) -> FitResiduals {
+        let errors: Vec<f64> = self
+            .test
+            .par_iter()
+            .map(|t| self.error(t, luminance(fit(t.wi, t.wo))))
+            .collect();
         let count = f64::from(u32::try_from(errors.len().max(1)).unwrap_or(u32::MAX));
         let relative_rmse = (errors.iter().map(|e| e * e).sum::<f64>() / count).sqrt();
         let (fits, floors) = (self.split(&errors), self.floor_errors());
@@ -214,7 +272,13 @@ impl Judge {
             })
             .collect();
         let invalid_share = self.invalid_share;
-        FitResiduals { relative_rmse, all: both(0), near_mirror: both(1), instrument, invalid_share }
+        FitResiduals {
+            relative_rmse,
+            all: both(0),
+            near_mirror: both(1),
+            instrument,
+            invalid_share,
+        }
     }
 }
 
@@ -224,7 +288,10 @@ fn ring_median(measured: &dyn MeasuredBrdf, wi: Direction, wo: Direction) -> Opt
     let ring: Vec<LinearRgb> = (0..180)
         .filter_map(|k| {
             let (i, o) = half_frame_pair(half.theta_h, half.theta_d, f64::from(k) * TAU / 180.0);
-            (i[2] > 0.05 && o[2] > 0.05).then(|| Sample::take(measured, i, o)).flatten().map(|s| s.rgb)
+            (i[2] > 0.05 && o[2] > 0.05)
+                .then(|| Sample::take(measured, i, o))
+                .flatten()
+                .map(|s| s.rgb)
         })
         .collect();
     (!ring.is_empty()).then(|| {
@@ -255,17 +322,31 @@ mod tests {
         let [all, near] = judge.floor_errors();
         // Neighbours stand within 0.3° of each other, where the function changes by 0.5 %.
         assert!(all.p90 < 5e-3 && near.p90 < 5e-3, "{all:?} {near:?}");
-        let residuals = judge.residuals(|wi, wo| OfHalfAngles.reflectance(wi, wo).expect("everywhere"));
+        let residuals =
+            judge.residuals(|wi, wo| OfHalfAngles.reflectance(wi, wo).expect("everywhere"));
         assert!(residuals.all.p90 == 0.0 && residuals.relative_rmse == 0.0);
-        assert!(residuals.instrument.len() == 6 && residuals.instrument.iter().all(|i| i.fit == 0.0 && i.floor < 1e-9));
+        assert!(
+            residuals.instrument.len() == 6
+                && residuals
+                    .instrument
+                    .iter()
+                    .all(|i| i.fit == 0.0 && i.floor < 1e-9)
+        );
     }
 
     #[test]
     fn an_error_of_a_tenth_is_read_as_a_tenth() {
         let judge = Judge::new(&OfHalfAngles, Frame::Air, 1.0);
-        let residuals =
-            judge.residuals(|wi, wo| OfHalfAngles.reflectance(wi, wo).expect("everywhere").map(|v| v * 1.1));
-        assert!((residuals.all.median - 0.1).abs() < 1e-9 && (residuals.near_mirror.p90 - 0.1).abs() < 1e-9);
+        let residuals = judge.residuals(|wi, wo| {
+            OfHalfAngles
+                .reflectance(wi, wo)
+                .expect("everywhere")
+                .map(|v| v * 1.1)
+        });
+        assert!(
+            (residuals.all.median - 0.1).abs() < 1e-9
+                && (residuals.near_mirror.p90 - 0.1).abs() < 1e-9
+        );
     }
 
     #[test]

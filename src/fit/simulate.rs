@@ -134,7 +134,12 @@ impl FlakeRecipe {
         ];
         for (field, value, low, high) in fields {
             if !(low..=high).contains(&value) {
-                return Err(FlakeFitError::Recipe { field, value, low, high });
+                return Err(FlakeFitError::Recipe {
+                    field,
+                    value,
+                    low,
+                    high,
+                });
             }
         }
         Ok(())
@@ -142,8 +147,14 @@ impl FlakeRecipe {
 
     fn grid(&self) -> AngleGrid {
         let steps = (self.angles - 1).max(1);
-        let angles = if self.largest_deg > 0.0 { self.angles } else { 1 };
-        let degrees = (0..angles).map(|k| self.largest_deg * f64::from(k) / f64::from(steps)).collect();
+        let angles = if self.largest_deg > 0.0 {
+            self.angles
+        } else {
+            1
+        };
+        let degrees = (0..angles)
+            .map(|k| self.largest_deg * f64::from(k) / f64::from(steps))
+            .collect();
         // Multiples of a positive step up to at most 85°.
         AngleGrid::new(degrees).unwrap_or_else(|_| AngleGrid::single())
     }
@@ -161,22 +172,43 @@ impl Patch {
         for _ in 0..count {
             let radius = recipe.radius_um * (0.3 * random.normal()).exp() / recipe.texel_um;
             discs.push((random.uniform() * side, random.uniform() * side, radius));
-            let (slope, turn) = (recipe.tilt * (-random.uniform().ln()).sqrt(), 2.0 * PI * random.uniform());
+            let (slope, turn) = (
+                recipe.tilt * (-random.uniform().ln()).sqrt(),
+                2.0 * PI * random.uniform(),
+            );
             let length = 1.0_f64.hypot(slope);
-            let normal = [slope * turn.cos() / length, slope * turn.sin() / length, 1.0 / length];
+            let normal = [
+                slope * turn.cos() / length,
+                slope * turn.sin() / length,
+                1.0 / length,
+            ];
             let depth = (recipe.depth_spread * random.normal()).exp();
-            let color = recipe.tint.map(|t| t * depth * (recipe.tint_spread * random.normal()).exp());
+            let color = recipe
+                .tint
+                .map(|t| t * depth * (recipe.tint_spread * random.normal()).exp());
             flakes.push(Flake { normal, color });
         }
         let (shows, starts) = topmost(&discs, recipe.texels as usize);
         let (theta_h, theta_d) = (recipe.grid(), recipe.grid());
         let width = recipe.half_width_deg.to_radians().tan();
         let (texel_um, texels) = (recipe.texel_um, recipe.texels);
-        let mut patch = Self { theta_h, theta_d, texel_um, texels, width, flakes, shows, starts };
+        let mut patch = Self {
+            theta_h,
+            theta_d,
+            texel_um,
+            texels,
+            width,
+            flakes,
+            shows,
+            starts,
+        };
         let mean = patch.mean_luminance();
         if mean > 0.0 {
             let gain = recipe.share * base_luminance(base) / mean;
-            patch.flakes.iter_mut().for_each(|flake| flake.color = flake.color.map(|c| c * gain));
+            patch
+                .flakes
+                .iter_mut()
+                .for_each(|flake| flake.color = flake.color.map(|c| c * gain));
         }
         Ok(patch)
     }
@@ -198,7 +230,9 @@ impl Patch {
 
     fn texel(&self, texel: usize, reflections: &[LinearRgb]) -> LinearRgb {
         let mut sum = [0.0; 3];
-        for (flake, share) in &self.shows[self.starts[texel] as usize..self.starts[texel + 1] as usize] {
+        for (flake, share) in
+            &self.shows[self.starts[texel] as usize..self.starts[texel + 1] as usize]
+        {
             let color = reflections[*flake as usize];
             (0..3).for_each(|k| sum[k] += f64::from(*share) * color[k]);
         }
@@ -208,7 +242,10 @@ impl Patch {
     fn mean_luminance(&self) -> f64 {
         let reflections = self.reflections(0.0, 0.0);
         let texels = self.starts.len() - 1;
-        (0..texels).map(|t| luminance(self.texel(t, &reflections))).sum::<f64>() / texels as f64
+        (0..texels)
+            .map(|t| luminance(self.texel(t, &reflections)))
+            .sum::<f64>()
+            / texels as f64
     }
 }
 
@@ -231,12 +268,17 @@ fn topmost(discs: &[(f64, f64, f64)], side: usize) -> (Vec<(u32, f32)>, Vec<u32>
     let fine = side * PLACES;
     let mut top = vec![NONE; fine * fine];
     for (number, &(x, y, radius)) in (0_u32..).zip(discs) {
-        let (x, y, radius) = (x * PLACES as f64, y * PLACES as f64, (radius * PLACES as f64).min(fine as f64 / 2.0));
+        let (x, y, radius) = (
+            x * PLACES as f64,
+            y * PLACES as f64,
+            (radius * PLACES as f64).min(fine as f64 / 2.0),
+        );
         let range = |c: f64| (c - radius).floor() as i64..=(c + radius).ceil() as i64;
         for v in range(y) {
             for u in range(x) {
                 let inside = (u as f64 + 0.5 - x).hypot(v as f64 + 0.5 - y) <= radius;
-                let place = &mut top[v.rem_euclid(fine as i64) as usize * fine + u.rem_euclid(fine as i64) as usize];
+                let place = &mut top[v.rem_euclid(fine as i64) as usize * fine
+                    + u.rem_euclid(fine as i64) as usize];
                 if inside && *place == NONE {
                     *place = number;
                 }
@@ -246,7 +288,8 @@ fn topmost(discs: &[(f64, f64, f64)], side: usize) -> (Vec<(u32, f32)>, Vec<u32>
     let (mut shows, mut starts) = (Vec::new(), vec![0]);
     for texel in 0..side * side {
         let (x, y) = (texel % side * PLACES, texel / side * PLACES);
-        let mut seen: [u32; PLACES * PLACES] = std::array::from_fn(|k| top[(y + k / PLACES) * fine + x + k % PLACES]);
+        let mut seen: [u32; PLACES * PLACES] =
+            std::array::from_fn(|k| top[(y + k / PLACES) * fine + x + k % PLACES]);
         seen.sort_unstable();
         for run in seen.chunk_by(|a, b| a == b).filter(|run| run[0] != NONE) {
             shows.push((run[0], run.len() as f32 / seen.len() as f32));
@@ -286,7 +329,11 @@ impl FlakePictures for Patch {
         picture.planes.iter_mut().for_each(Vec::clear);
         for texel in 0..self.starts.len() - 1 {
             let color = self.texel(texel, &reflections);
-            picture.planes.iter_mut().zip(color).for_each(|(plane, c)| plane.push(c as f32));
+            picture
+                .planes
+                .iter_mut()
+                .zip(color)
+                .for_each(|(plane, c)| plane.push(c as f32));
         }
         Ok(())
     }
@@ -322,14 +369,30 @@ mod tests {
     use std::ops::ControlFlow;
 
     fn silver() -> CarPaint {
-        let lobe = |s: f64, alpha: f64, f0: f64| Lobe { weight: [s; 3], alpha, f0 };
-        let lobes = vec![lobe(0.08, 0.38, 1.0), lobe(0.11, 0.17, 0.92), lobe(0.013, 0.013, 0.9)];
-        CarPaint { coat: None, diffuse: [0.06; 3], lobes, color_table: ColorTable::white(), flakes: None }
+        let lobe = |s: f64, alpha: f64, f0: f64| Lobe {
+            weight: [s; 3],
+            alpha,
+            f0,
+        };
+        let lobes = vec![
+            lobe(0.08, 0.38, 1.0),
+            lobe(0.11, 0.17, 0.92),
+            lobe(0.013, 0.013, 0.9),
+        ];
+        CarPaint {
+            coat: None,
+            diffuse: [0.06; 3],
+            lobes,
+            color_table: ColorTable::white(),
+            flakes: None,
+        }
     }
 
     fn simulated(recipe: &FlakeRecipe) -> FittedFlakes {
-        simulate_flakes(&silver(), recipe, &ClusterSettings::default(), &|_, _| ControlFlow::Continue(()))
-            .expect("in range")
+        simulate_flakes(&silver(), recipe, &ClusterSettings::default(), &|_, _| {
+            ControlFlow::Continue(())
+        })
+        .expect("in range")
     }
 
     const SMALL: FlakeRecipe = FlakeRecipe {
@@ -353,7 +416,11 @@ mod tests {
         let flakes = simulated(&SMALL).flakes;
         let mean = |h: usize, d: usize| luminance(flakes.slice(h, d).mean());
         let wanted = 0.15 * base_luminance(&silver());
-        assert!((mean(0, 0) / wanted - 1.0).abs() < 1e-5, "{} instead of {wanted}", mean(0, 0));
+        assert!(
+            (mean(0, 0) / wanted - 1.0).abs() < 1e-5,
+            "{} instead of {wanted}",
+            mean(0, 0)
+        );
         assert!(mean(2, 0) < mean(0, 0) && mean(6, 0) < 0.02 * mean(0, 0));
     }
 
@@ -361,39 +428,69 @@ mod tests {
     fn few_texels_shine_many_times_brighter_than_the_mean() {
         let patch = Patch::new(&silver(), &SMALL).expect("in range");
         let reflections = patch.reflections(12.0, 10.0);
-        let mut light: Vec<f64> =
-            (0..patch.starts.len() - 1).map(|t| luminance(patch.texel(t, &reflections))).collect();
+        let mut light: Vec<f64> = (0..patch.starts.len() - 1)
+            .map(|t| luminance(patch.texel(t, &reflections)))
+            .collect();
         light.sort_by(f64::total_cmp);
         let mean = light.iter().sum::<f64>() / light.len() as f64;
-        assert!(light[light.len() * 99 / 100] > 8.0 * mean, "99th percentile over mean");
+        assert!(
+            light[light.len() * 99 / 100] > 8.0 * mean,
+            "99th percentile over mean"
+        );
         assert!(light[light.len() / 2] < 0.5 * mean, "median over mean");
     }
 
     #[test]
     fn coarser_flakes_have_a_larger_grain() {
-        let grain = |radius_um: f64| simulated(&FlakeRecipe { radius_um, angles: 4, ..SMALL }).flakes.texture.grain_um;
+        let grain = |radius_um: f64| {
+            simulated(&FlakeRecipe {
+                radius_um,
+                angles: 4,
+                ..SMALL
+            })
+            .flakes
+            .texture
+            .grain_um
+        };
         let (fine, coarse) = (grain(8.0), grain(40.0));
         assert!(coarse > 1.5 * fine, "{fine} {coarse}");
     }
 
     #[test]
     fn the_same_seed_is_the_same_patch_and_another_is_not() {
-        let small = FlakeRecipe { angles: 3, texels: 24, ..SMALL };
+        let small = FlakeRecipe {
+            angles: 3,
+            texels: 24,
+            ..SMALL
+        };
         let one = simulated(&small);
         assert_eq!(one, simulated(&small));
-        assert_ne!(one.flakes, simulated(&FlakeRecipe { seed: 4, ..small }).flakes);
+        assert_ne!(
+            one.flakes,
+            simulated(&FlakeRecipe { seed: 4, ..small }).flakes
+        );
     }
 
     #[test]
     fn a_recipe_out_of_range_is_refused_by_field() {
-        let recipe = FlakeRecipe { tilt: f64::NAN, ..SMALL };
-        let error = simulate_flakes(&silver(), &recipe, &ClusterSettings::default(), &|_, _| ControlFlow::Continue(()));
+        let recipe = FlakeRecipe {
+            tilt: f64::NAN,
+            ..SMALL
+        };
+        let error = simulate_flakes(&silver(), &recipe, &ClusterSettings::default(), &|_, _| {
+            ControlFlow::Continue(())
+        });
         assert!(error.expect_err("refused").to_string().contains("tilt"));
     }
 
     #[test]
     fn no_flakes_at_all_are_black_slices() {
-        let flakes = simulated(&FlakeRecipe { per_mm2: 0.0, angles: 2, ..SMALL }).flakes;
+        let flakes = simulated(&FlakeRecipe {
+            per_mm2: 0.0,
+            angles: 2,
+            ..SMALL
+        })
+        .flakes;
         assert_eq!(flakes.clusters(), 4);
         assert_eq!(flakes.slice(0, 0).mean(), [0.0; 3]);
     }

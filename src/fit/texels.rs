@@ -33,7 +33,11 @@ fn lab_of(rgb: [&[f32]; 3], out: &mut [[f32; LANES]; 3]) -> bool {
     let mut outside = 0_u32;
     for k in 0..n {
         let f = M.map(|m| compress(m[0] * r[k] + m[1] * g[k] + m[2] * b[k]));
-        let lab = [116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])];
+        let lab = [
+            116.0 * f[1] - 16.0,
+            500.0 * (f[0] - f[1]),
+            200.0 * (f[1] - f[2]),
+        ];
         let inside = (lab[0].abs() <= bound) & (lab[1].abs() <= bound) & (lab[2].abs() <= bound);
         outside |= u32::from(!inside);
         (light[k], green_red[k], yellow_blue[k]) = (lab[0], lab[1], lab[2]);
@@ -44,7 +48,11 @@ fn lab_of(rgb: [&[f32]; 3], out: &mut [[f32; LANES]; 3]) -> bool {
 /// The matrix from linear sRGB in 1/sr to XYZ of π f over white.
 const fn pi_xyz_over_white() -> [[f32; 3]; 3] {
     let white = [D65_2.x, D65_2.y, D65_2.z];
-    let columns = [rgb_to_xyz([1.0, 0.0, 0.0]), rgb_to_xyz([0.0, 1.0, 0.0]), rgb_to_xyz([0.0, 0.0, 1.0])];
+    let columns = [
+        rgb_to_xyz([1.0, 0.0, 0.0]),
+        rgb_to_xyz([0.0, 1.0, 0.0]),
+        rgb_to_xyz([0.0, 0.0, 1.0]),
+    ];
     let mut m = [[0.0; 3]; 3];
     let mut k = 0;
     while k < 9 {
@@ -71,12 +79,20 @@ fn compress(t: f32) -> f32 {
     let y = guess * (cube + 2.0 * x) * inverse;
     // Newton's step takes 1/(3y²), which the guess's y/(2 cube + x) is to a tenth: no second division.
     let y = y - (y * y * y - x) * y * inverse;
-    if t > KNEE_LIGHT { y } else { t * SLOPE + (4.0 / 29.0) as f32 }
+    if t > KNEE_LIGHT {
+        y
+    } else {
+        t * SLOPE + (4.0 / 29.0) as f32
+    }
 }
 
 /// Fills `texels` with the finite pixels and `light` with what the picture says of all; returns how many are not finite,
 /// and how many lie beyond the bounds.
-pub(super) fn take_in(planes: [&[f32]; 3], texels: &mut Vec<Texel>, light: &mut Vec<[f32; 4]>) -> (usize, usize) {
+pub(super) fn take_in(
+    planes: [&[f32]; 3],
+    texels: &mut Vec<Texel>,
+    light: &mut Vec<[f32; 4]>,
+) -> (usize, usize) {
     let [red, green, blue] = planes;
     texels.clear();
     texels.reserve(red.len());
@@ -85,11 +101,19 @@ pub(super) fn take_in(planes: [&[f32]; 3], texels: &mut Vec<Texel>, light: &mut 
     let mut lab = [[0.0_f32; LANES]; 3];
     let mut within = true;
     let mut first = 0_u32;
-    for ((r, g), b) in red.chunks(LANES).zip(green.chunks(LANES)).zip(blue.chunks(LANES)) {
+    for ((r, g), b) in red
+        .chunks(LANES)
+        .zip(green.chunks(LANES))
+        .zip(blue.chunks(LANES))
+    {
         within &= lab_of([r, g, b], &mut lab);
         let [l, green_red, yellow_blue] = &lab;
         let colors = l.iter().zip(green_red).zip(yellow_blue).take(r.len());
-        texels.extend((first..).zip(colors).map(|(number, ((l, a), b))| [*l, *a, *b, disguised(number)]));
+        texels.extend(
+            (first..)
+                .zip(colors)
+                .map(|(number, ((l, a), b))| [*l, *a, *b, disguised(number)]),
+        );
         light.extend(r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b, 0.0]));
         first += LANES as u32;
     }
@@ -102,11 +126,19 @@ pub(super) fn take_in(planes: [&[f32]; 3], texels: &mut Vec<Texel>, light: &mut 
     for texel in texels.iter_mut() {
         // A finite color whose own arithmetic overflowed is as light as can be.
         let overflown = [bound, 0.0, 0.0];
-        let held = [0, 1, 2].map(|k| if texel[k].is_nan() { overflown[k] } else { texel[k].clamp(-bound, bound) });
+        let held = [0, 1, 2].map(|k| {
+            if texel[k].is_nan() {
+                overflown[k]
+            } else {
+                texel[k].clamp(-bound, bound)
+            }
+        });
         if held != texel[..3] {
             beyond += 1;
             texel[..3].copy_from_slice(&held);
-            let rgb = Lab::from(held.map(f64::from)).to_rgb().map(|v| (v / std::f64::consts::PI) as f32);
+            let rgb = Lab::from(held.map(f64::from))
+                .to_rgb()
+                .map(|v| (v / std::f64::consts::PI) as f32);
             light[number(texel)][..3].copy_from_slice(&rgb);
         }
     }
@@ -155,19 +187,36 @@ mod tests {
     #[test]
     fn pixels_that_are_no_numbers_are_left_out_and_counted() {
         let nan = f32::NAN;
-        let (kept, _, counts) =
-            texels(&[[0.1; 3], [nan, 0.1, 0.1], [0.2; 3], [0.1, f32::INFINITY, 0.1], [0.1, 0.1, nan]]);
+        let (kept, _, counts) = texels(&[
+            [0.1; 3],
+            [nan, 0.1, 0.1],
+            [0.2; 3],
+            [0.1, f32::INFINITY, 0.1],
+            [0.1, 0.1, nan],
+        ]);
         assert_eq!(counts, (3, 0));
         assert_eq!(kept.iter().map(number).collect::<Vec<_>>(), [0, 2]);
     }
 
     #[test]
     fn colors_beyond_the_bounds_are_held_there_and_counted() {
-        let (kept, light, counts) = texels(&[[0.1; 3], [1e5; 3], [f32::MAX, f32::MAX, 0.0], [-1e30, 0.0, 1e30]]);
+        let (kept, light, counts) = texels(&[
+            [0.1; 3],
+            [1e5; 3],
+            [f32::MAX, f32::MAX, 0.0],
+            [-1e30, 0.0, 1e30],
+        ]);
         assert_eq!(counts, (0, 3));
         let bound = MAX_LAB as f32;
-        assert!(kept.iter().all(|t| t[..3].iter().all(|v| v.abs() <= bound)), "{kept:?}");
+        assert!(
+            kept.iter().all(|t| t[..3].iter().all(|v| v.abs() <= bound)),
+            "{kept:?}"
+        );
         assert_eq!(kept[1][0], bound);
-        assert!(linear(&kept[1], &light).iter().all(|v| v.is_finite() && *v > 1000.0));
+        assert!(
+            linear(&kept[1], &light)
+                .iter()
+                .all(|v| v.is_finite() && *v > 1000.0)
+        );
     }
 }

@@ -26,7 +26,11 @@ pub(super) enum Source {
 /// The files of a package.
 #[derive(Clone, Debug)]
 pub(super) enum Archive {
-    Zip { source: Source, directory: Arc<ZipArchiveMetadata>, index: Arc<std::collections::HashMap<String, usize>> },
+    Zip {
+        source: Source,
+        directory: Arc<ZipArchiveMetadata>,
+        index: Arc<std::collections::HashMap<String, usize>>,
+    },
     Folder(PathBuf),
 }
 
@@ -43,7 +47,11 @@ impl Cursor {
             Source::File(file) => file.metadata()?.len(),
             Source::Memory(bytes) => bytes.len() as u64,
         };
-        Ok(Self { source, position: 0, length })
+        Ok(Self {
+            source,
+            position: 0,
+            length,
+        })
     }
 }
 
@@ -62,7 +70,9 @@ impl Read for Cursor {
         let count = match &self.source {
             Source::File(file) => read_at(file, into, self.position)?,
             Source::Memory(bytes) => {
-                let start = usize::try_from(self.position).unwrap_or(usize::MAX).min(bytes.len());
+                let start = usize::try_from(self.position)
+                    .unwrap_or(usize::MAX)
+                    .min(bytes.len());
                 (&bytes[start..]).read(into)?
             }
         };
@@ -91,11 +101,17 @@ impl Archive {
 
     /// A zip archive or a folder on disk.
     pub(super) fn at(path: &Path, limits: &Limits) -> Result<Self, PackageError> {
-        let open = |source| PackageError::Open { path: path.to_owned(), source };
+        let open = |source| PackageError::Open {
+            path: path.to_owned(),
+            source,
+        };
         if path.metadata().map_err(open)?.is_dir() {
             return Ok(Self::Folder(path.to_owned()));
         }
-        Self::zip(Source::File(Arc::new(File::open(path).map_err(open)?)), limits)
+        Self::zip(
+            Source::File(Arc::new(File::open(path).map_err(open)?)),
+            limits,
+        )
     }
 
     /// A zip archive in an open file.
@@ -104,7 +120,9 @@ impl Archive {
     }
 
     fn zip(source: Source, limits: &Limits) -> Result<Self, PackageError> {
-        let archive = |error: &dyn std::fmt::Display| PackageError::Archive { reason: error.to_string() };
+        let archive = |error: &dyn std::fmt::Display| PackageError::Archive {
+            reason: error.to_string(),
+        };
         let cursor = Cursor::new(source.clone()).map_err(|e| archive(&e))?;
         if cursor.length > limits.bytes {
             return Err(PackageError::Size {
@@ -115,17 +133,26 @@ impl Archive {
         }
         let directory = ZipArchive::new(cursor).map_err(|e| archive(&e))?.metadata();
         if directory.len() > limits.entries {
-            return Err(PackageError::Entries { count: directory.len(), accepted: limits.entries });
+            return Err(PackageError::Entries {
+                count: directory.len(),
+                accepted: limits.entries,
+            });
         }
         if directory.has_duplicate_names() {
-            return Err(PackageError::Archive { reason: "it holds two files of one name".into() });
+            return Err(PackageError::Archive {
+                reason: "it holds two files of one name".into(),
+            });
         }
         let mut index = std::collections::HashMap::with_capacity(directory.len());
         for k in 0..directory.len() {
             let entry = directory.entry(k).map_err(|e| archive(&e))?;
             index.insert(String::from_utf8_lossy(entry.name_raw()).into_owned(), k);
         }
-        Ok(Self::Zip { source, directory, index: Arc::new(index) })
+        Ok(Self::Zip {
+            source,
+            directory,
+            index: Arc::new(index),
+        })
     }
 
     /// Whether there is a file of this name.
@@ -137,21 +164,48 @@ impl Archive {
     }
 
     /// Replaces `into` by the file of this name, at most `most` bytes of it.
-    pub(super) fn read(&self, name: &str, most: u64, into: &mut Vec<u8>) -> Result<(), PackageError> {
+    pub(super) fn read(
+        &self,
+        name: &str,
+        most: u64,
+        into: &mut Vec<u8>,
+    ) -> Result<(), PackageError> {
         into.clear();
-        let damaged = |reason: String| PackageError::Damaged { file: name.to_owned(), reason };
-        let too_large = |bytes| PackageError::Size { file: name.to_owned(), bytes, accepted: most };
-        let missing = || PackageError::Missing { file: name.to_owned() };
+        let damaged = |reason: String| PackageError::Damaged {
+            file: name.to_owned(),
+            reason,
+        };
+        let too_large = |bytes| PackageError::Size {
+            file: name.to_owned(),
+            bytes,
+            accepted: most,
+        };
+        let missing = || PackageError::Missing {
+            file: name.to_owned(),
+        };
         match self {
-            Self::Zip { source, directory, index } => {
+            Self::Zip {
+                source,
+                directory,
+                index,
+            } => {
                 let entry = index.get(name).ok_or_else(missing)?;
-                let entry = directory.entry(*entry).map_err(|e| damaged(e.to_string()))?;
+                let entry = directory
+                    .entry(*entry)
+                    .map_err(|e| damaged(e.to_string()))?;
                 if entry.size() > most {
                     return Err(too_large(entry.size()));
                 }
                 let method = entry.compression();
-                if entry.encrypted() || !matches!(method, CompressionMethod::Stored | CompressionMethod::Deflated) {
-                    return Err(damaged(format!("packed by {method:?}, accepted is stored or deflated, unencrypted")));
+                if entry.encrypted()
+                    || !matches!(
+                        method,
+                        CompressionMethod::Stored | CompressionMethod::Deflated
+                    )
+                {
+                    return Err(damaged(format!(
+                        "packed by {method:?}, accepted is stored or deflated, unencrypted"
+                    )));
                 }
                 let size = usize::try_from(entry.size()).map_err(|_| too_large(entry.size()))?;
                 let mut cursor = Cursor::new(source.clone()).map_err(|e| damaged(e.to_string()))?;
@@ -159,7 +213,10 @@ impl Archive {
                 let mut file = file.map_err(|e| damaged(e.to_string()))?;
                 // The directory's size is a claim: memory grows with what really comes.
                 into.reserve(size.min(1 << 20));
-                (&mut file).take(most + 1).read_to_end(into).map_err(|e| damaged(e.to_string()))?;
+                (&mut file)
+                    .take(most + 1)
+                    .read_to_end(into)
+                    .map_err(|e| damaged(e.to_string()))?;
             }
             Self::Folder(folder) => {
                 let path = within(folder, name).ok_or_else(missing)?;
@@ -167,7 +224,9 @@ impl Archive {
                     io::ErrorKind::NotFound => missing(),
                     _ => damaged(e.to_string()),
                 })?;
-                file.take(most + 1).read_to_end(into).map_err(|e| damaged(e.to_string()))?;
+                file.take(most + 1)
+                    .read_to_end(into)
+                    .map_err(|e| damaged(e.to_string()))?;
             }
         }
         if into.len() as u64 > most {
@@ -180,7 +239,9 @@ impl Archive {
 /// Path of a name inside a folder; `None` for a name that would leave it.
 fn within(folder: &Path, name: &str) -> Option<PathBuf> {
     let name = Path::new(name);
-    let inside = name.components().all(|part| matches!(part, Component::Normal(_)));
+    let inside = name
+        .components()
+        .all(|part| matches!(part, Component::Normal(_)));
     (inside && name.components().next().is_some()).then(|| folder.join(name))
 }
 
@@ -191,7 +252,10 @@ mod tests {
     #[test]
     fn a_name_cannot_leave_the_folder() {
         let folder = Path::new("/lab/silver");
-        assert_eq!(within(folder, "flakes/00_00.exr"), Some(folder.join("flakes/00_00.exr")));
+        assert_eq!(
+            within(folder, "flakes/00_00.exr"),
+            Some(folder.join("flakes/00_00.exr"))
+        );
         for name in ["../blue/paint.json", "/etc/passwd", "flakes/../../x", ""] {
             assert_eq!(within(folder, name), None, "{name}");
         }

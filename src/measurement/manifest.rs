@@ -29,8 +29,16 @@ pub(super) struct Manifest {
 /// The base as the manifest describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum BaseEntry {
-    Model { diffuse: LinearRgb, lobes: Vec<Lobe>, color_table: Option<TableEntry> },
-    Table { file: String, layout: TableLayout, header_bytes: u64 },
+    Model {
+        diffuse: LinearRgb,
+        lobes: Vec<Lobe>,
+        color_table: Option<TableEntry>,
+    },
+    Table {
+        file: String,
+        layout: TableLayout,
+        header_bytes: u64,
+    },
 }
 
 /// The color table's picture.
@@ -104,7 +112,8 @@ impl SlicePattern {
         }
         pieces.push(Piece::Text(rest.to_owned()));
         let has = |wanted: fn(&Piece) -> bool| pieces.iter().any(wanted);
-        (has(|p| matches!(p, Piece::ThetaH(_))) && has(|p| matches!(p, Piece::ThetaD(_)))).then_some(Self(pieces))
+        (has(|p| matches!(p, Piece::ThetaH(_))) && has(|p| matches!(p, Piece::ThetaD(_))))
+            .then_some(Self(pieces))
     }
 
     /// Name of one slice.
@@ -134,42 +143,77 @@ impl<'a> Field<'a> {
         if value.len() > 60 {
             value = value.chars().take(57).chain("...".chars()).collect();
         }
-        Err(PackageError::Field { field: self.path.clone(), value, accepted: accepted.into() })
+        Err(PackageError::Field {
+            field: self.path.clone(),
+            value,
+            accepted: accepted.into(),
+        })
     }
 
     fn get(&self, key: &str) -> Option<Field<'a>> {
         let value = self.value.get(key).filter(|v| !v.is_null())?;
-        let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
+        let path = if self.path.is_empty() {
+            key.to_owned()
+        } else {
+            format!("{}.{key}", self.path)
+        };
         Some(Field { path, value })
     }
 
     fn want(&self, key: &str, accepted: &str) -> Result<Field<'a>, PackageError> {
-        let field = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
-        let missing = || PackageError::Field { field, value: "missing".into(), accepted: accepted.into() };
+        let field = if self.path.is_empty() {
+            key.to_owned()
+        } else {
+            format!("{}.{key}", self.path)
+        };
+        let missing = || PackageError::Field {
+            field,
+            value: "missing".into(),
+            accepted: accepted.into(),
+        };
         self.get(key).ok_or_else(missing)
     }
 
     fn object(&self, keys: &[&str], warnings: &mut Vec<String>) -> Result<(), PackageError> {
-        let Value::Object(map) = self.value else { return self.refuse(format!("an object with {}", keys.join(", "))) };
+        let Value::Object(map) = self.value else {
+            return self.refuse(format!("an object with {}", keys.join(", ")));
+        };
         for key in map.keys().filter(|key| !keys.contains(&key.as_str())) {
-            let place = if self.path.is_empty() { String::new() } else { format!(" in {}", self.path) };
-            warnings.push(format!("{MANIFEST}: \"{key}\"{place} is no key of the format and was not read"));
+            let place = if self.path.is_empty() {
+                String::new()
+            } else {
+                format!(" in {}", self.path)
+            };
+            warnings.push(format!(
+                "{MANIFEST}: \"{key}\"{place} is no key of the format and was not read"
+            ));
         }
         Ok(())
     }
 
     fn list(&self, most: usize, what: &str) -> Result<Vec<Field<'a>>, PackageError> {
-        let Value::Array(items) = self.value else { return self.refuse(format!("a list of {what}")) };
+        let Value::Array(items) = self.value else {
+            return self.refuse(format!("a list of {what}"));
+        };
         if items.len() > most {
             let value = format!("{} entries", items.len());
-            return Err(PackageError::Field { field: self.path.clone(), value, accepted: format!("at most {most}") });
+            return Err(PackageError::Field {
+                field: self.path.clone(),
+                value,
+                accepted: format!("at most {most}"),
+            });
         }
-        let item = |(k, value)| Field { path: format!("{}[{k}]", self.path), value };
+        let item = |(k, value)| Field {
+            path: format!("{}[{k}]", self.path),
+            value,
+        };
         Ok(items.iter().enumerate().map(item).collect())
     }
 
     fn text(&self) -> Result<&'a str, PackageError> {
-        self.value.as_str().map_or_else(|| self.refuse("a string"), Ok)
+        self.value
+            .as_str()
+            .map_or_else(|| self.refuse("a string"), Ok)
     }
 
     fn number(&self, low: f64, high: f64, accepted: &str) -> Result<f64, PackageError> {
@@ -227,12 +271,33 @@ impl<'a> Field<'a> {
 impl Manifest {
     /// Reads a manifest.
     pub(super) fn parse(bytes: &[u8], limits: &Limits) -> Result<Self, PackageError> {
-        let value: Value = serde_json::from_slice(bytes)
-            .map_err(|error| PackageError::Damaged { file: MANIFEST.into(), reason: format!("no JSON: {error}") })?;
-        let root = Field { path: String::new(), value: &value };
+        let value: Value =
+            serde_json::from_slice(bytes).map_err(|error| PackageError::Damaged {
+                file: MANIFEST.into(),
+                reason: format!("no JSON: {error}"),
+            })?;
+        let root = Field {
+            path: String::new(),
+            value: &value,
+        };
         let mut warnings = Vec::new();
-        let notes = ["license", "instrument", "maker", "color_code", "measured_on"];
-        let keys = ["format", "version", "name", "color_space", "clear_coat", "base", "flakes", "multi_angle"];
+        let notes = [
+            "license",
+            "instrument",
+            "maker",
+            "color_code",
+            "measured_on",
+        ];
+        let keys = [
+            "format",
+            "version",
+            "name",
+            "color_space",
+            "clear_coat",
+            "base",
+            "flakes",
+            "multi_angle",
+        ];
         let format = root.want("format", "\"measured-paint\"")?;
         if format.text()? != "measured-paint" {
             return format.refuse("\"measured-paint\"");
@@ -240,7 +305,12 @@ impl Manifest {
         let version = root.want("version", "1")?;
         match version.value.as_u64() {
             Some(VERSION) => {}
-            Some(found) if found > VERSION => return Err(PackageError::Newer { found, known: VERSION }),
+            Some(found) if found > VERSION => {
+                return Err(PackageError::Newer {
+                    found,
+                    known: VERSION,
+                });
+            }
             _ => return version.refuse("1"),
         }
         root.object(&[&keys[..], &notes[..]].concat(), &mut warnings)?;
@@ -258,25 +328,58 @@ impl Manifest {
                 kept.insert(key.to_owned(), note.text()?.to_owned());
             }
         }
-        let coat = root.get("clear_coat").map(|f| coat(&f, &mut warnings)).transpose()?;
-        let base = root.get("base").map(|f| base(&f, limits, &mut warnings)).transpose()?;
-        let flakes = root.get("flakes").map(|f| flakes(&f, limits, &mut warnings)).transpose()?;
-        let multi_angle = root.get("multi_angle").map(|f| multi_angle(&f, limits, &mut warnings)).transpose()?;
+        let coat = root
+            .get("clear_coat")
+            .map(|f| coat(&f, &mut warnings))
+            .transpose()?;
+        let base = root
+            .get("base")
+            .map(|f| base(&f, limits, &mut warnings))
+            .transpose()?;
+        let flakes = root
+            .get("flakes")
+            .map(|f| flakes(&f, limits, &mut warnings))
+            .transpose()?;
+        let multi_angle = root
+            .get("multi_angle")
+            .map(|f| multi_angle(&f, limits, &mut warnings))
+            .transpose()?;
         if base.is_none() && multi_angle.is_none() {
-            root.want("base", "an object with model or brdf_table, where there is no multi_angle")?;
+            root.want(
+                "base",
+                "an object with model or brdf_table, where there is no multi_angle",
+            )?;
         }
-        Ok(Self { name: name.text()?.to_owned(), notes: kept, coat, base, flakes, multi_angle, warnings })
+        Ok(Self {
+            name: name.text()?.to_owned(),
+            notes: kept,
+            coat,
+            base,
+            flakes,
+            multi_angle,
+            warnings,
+        })
     }
 }
 
 fn coat(field: &Field, warnings: &mut Vec<String>) -> Result<Coat, PackageError> {
     field.object(&["ior", "thickness_um"], warnings)?;
     let ior = field.want("ior", "1 to 4")?.number(1.0, 4.0, "1 to 4")?;
-    let thickness = field.get("thickness_um").map(|f| f.number(0.0, 1e6, "0 to 1000000")).transpose()?;
-    Ok(Coat { thickness_um: thickness, ..Coat::smooth(ior) })
+    let thickness = field
+        .get("thickness_um")
+        .map(|f| f.number(0.0, 1e6, "0 to 1000000"))
+        .transpose()?;
+    Ok(Coat {
+        thickness_um: thickness,
+        ..Coat::smooth(ior)
+    })
 }
 
-fn base(field: &Field, limits: &Limits, warnings: &mut Vec<String>) -> Result<BaseEntry, PackageError> {
+fn base(
+    field: &Field,
+    limits: &Limits,
+    warnings: &mut Vec<String>,
+) -> Result<BaseEntry, PackageError> {
     field.object(&["model", "brdf_table"], warnings)?;
     match (field.get("model"), field.get("brdf_table")) {
         (Some(model), None) => model_base(&model, limits, warnings),
@@ -288,24 +391,40 @@ fn base(field: &Field, limits: &Limits, warnings: &mut Vec<String>) -> Result<Ba
                 "merl" => TableLayout::Merl,
                 _ => return layout.refuse("\"mpi-2005\" or \"merl\""),
             };
-            let header_bytes = table.get("header_bytes").map_or(Ok(0), |f| f.whole(0, 1 << 20))?;
-            Ok(BaseEntry::Table { file: table.want("file", "the name of a file")?.file()?, layout, header_bytes })
+            let header_bytes = table
+                .get("header_bytes")
+                .map_or(Ok(0), |f| f.whole(0, 1 << 20))?;
+            Ok(BaseEntry::Table {
+                file: table.want("file", "the name of a file")?.file()?,
+                layout,
+                header_bytes,
+            })
         }
         _ => field.refuse("exactly one of model and brdf_table"),
     }
 }
 
-fn model_base(model: &Field, limits: &Limits, warnings: &mut Vec<String>) -> Result<BaseEntry, PackageError> {
+fn model_base(
+    model: &Field,
+    limits: &Limits,
+    warnings: &mut Vec<String>,
+) -> Result<BaseEntry, PackageError> {
     model.object(&["diffuse", "lobes", "color_table"], warnings)?;
-    let diffuse = model.want("diffuse", "a number from 0 to 1000, or three of them")?.channels()?;
+    let diffuse = model
+        .want("diffuse", "a number from 0 to 1000, or three of them")?
+        .channels()?;
     let list = model.want("lobes", "1 to 8 lobes")?;
     let mut lobes = Vec::new();
     for lobe in list.list(limits.lobes, "lobes")? {
         lobe.object(&["weight", "alpha", "f0"], warnings)?;
         let accepted = "above 0, to 10";
         lobes.push(Lobe {
-            weight: lobe.want("weight", "a number from 0 to 1000, or three of them")?.channels()?,
-            alpha: lobe.want("alpha", accepted)?.number(f64::MIN_POSITIVE, MAX_ALPHA, accepted)?,
+            weight: lobe
+                .want("weight", "a number from 0 to 1000, or three of them")?
+                .channels()?,
+            alpha: lobe
+                .want("alpha", accepted)?
+                .number(f64::MIN_POSITIVE, MAX_ALPHA, accepted)?,
             f0: lobe.want("f0", "0 to 1")?.number(0.0, 1.0, "0 to 1")?,
         });
     }
@@ -316,38 +435,85 @@ fn model_base(model: &Field, limits: &Limits, warnings: &mut Vec<String>) -> Res
         field.object(&["file", "theta_h_deg", "theta_i_deg"], warnings)?;
         Ok(TableEntry {
             file: field.want("file", "the name of a file")?.file()?,
-            theta_h: field.want("theta_h_deg", "a list of angles")?.angles(limits)?,
-            theta_d: field.want("theta_i_deg", "a list of angles")?.angles(limits)?,
+            theta_h: field
+                .want("theta_h_deg", "a list of angles")?
+                .angles(limits)?,
+            theta_d: field
+                .want("theta_i_deg", "a list of angles")?
+                .angles(limits)?,
         })
     };
     let color_table = model.get("color_table").map(table).transpose()?;
-    Ok(BaseEntry::Model { diffuse, lobes, color_table })
+    Ok(BaseEntry::Model {
+        diffuse,
+        lobes,
+        color_table,
+    })
 }
 
-fn flakes(field: &Field, limits: &Limits, warnings: &mut Vec<String>) -> Result<FlakesEntry, PackageError> {
-    field.object(&["slices", "theta_h_deg", "theta_i_deg", "texel_um", "size_px"], warnings)?;
+fn flakes(
+    field: &Field,
+    limits: &Limits,
+    warnings: &mut Vec<String>,
+) -> Result<FlakesEntry, PackageError> {
+    field.object(
+        &[
+            "slices",
+            "theta_h_deg",
+            "theta_i_deg",
+            "texel_um",
+            "size_px",
+        ],
+        warnings,
+    )?;
     let accepted = "a path with {h:02} and {i:02} in it";
     let slices = field.want("slices", accepted)?;
-    let Some(pattern) = SlicePattern::parse(&slices.file()?) else { return slices.refuse(accepted) };
+    let Some(pattern) = SlicePattern::parse(&slices.file()?) else {
+        return slices.refuse(accepted);
+    };
     let size = field.want("size_px", "[width, height]")?;
     let sides = size.list(2, "two numbers")?;
-    let [width, height] = &sides[..] else { return size.refuse("[width, height]") };
-    let side = |f: &Field| Ok(u32::try_from(f.whole(1, limits.pixels.min(1 << 24))?).unwrap_or(u32::MAX));
+    let [width, height] = &sides[..] else {
+        return size.refuse("[width, height]");
+    };
+    let side =
+        |f: &Field| Ok(u32::try_from(f.whole(1, limits.pixels.min(1 << 24))?).unwrap_or(u32::MAX));
     let (width, height) = (side(width)?, side(height)?);
     if u64::from(width) * u64::from(height) > limits.pixels {
         return size.refuse(format!("at most {} pixels", limits.pixels));
     }
     Ok(FlakesEntry {
         pattern,
-        theta_h: field.want("theta_h_deg", "a list of angles")?.angles(limits)?,
-        theta_d: field.want("theta_i_deg", "a list of angles")?.angles(limits)?,
-        texel_um: field.want("texel_um", "above 0, to 100000")?.number(f64::MIN_POSITIVE, 1e5, "above 0, to 100000")?,
+        theta_h: field
+            .want("theta_h_deg", "a list of angles")?
+            .angles(limits)?,
+        theta_d: field
+            .want("theta_i_deg", "a list of angles")?
+            .angles(limits)?,
+        texel_um: field.want("texel_um", "above 0, to 100000")?.number(
+            f64::MIN_POSITIVE,
+            1e5,
+            "above 0, to 100000",
+        )?,
         size: [width, height],
     })
 }
 
-fn multi_angle(field: &Field, limits: &Limits, warnings: &mut Vec<String>) -> Result<MultiAngle, PackageError> {
-    field.object(&["illumination_deg", "illuminant", "observer", "columns", "rows"], warnings)?;
+fn multi_angle(
+    field: &Field,
+    limits: &Limits,
+    warnings: &mut Vec<String>,
+) -> Result<MultiAngle, PackageError> {
+    field.object(
+        &[
+            "illumination_deg",
+            "illuminant",
+            "observer",
+            "columns",
+            "rows",
+        ],
+        warnings,
+    )?;
     let illuminant = field.want("illuminant", "\"D65\" or \"D50\"")?;
     let observer = field.want("observer", "\"2\" or \"10\"")?;
     let list = field.want("columns", "a list of names, the first aspecular_deg")?;
@@ -361,7 +527,10 @@ fn multi_angle(field: &Field, limits: &Limits, warnings: &mut Vec<String>) -> Re
         return list.refuse("aspecular_deg first, then L, a, b or spectral columns nm400 to nm700");
     }
     let mut rows = Vec::new();
-    for row in field.want("rows", "a list of rows")?.list(limits.angles, "rows")? {
+    for row in field
+        .want("rows", "a list of rows")?
+        .list(limits.angles, "rows")?
+    {
         let cells = row.list(columns.len(), "numbers")?;
         if cells.len() != columns.len() {
             return row.refuse(format!("{} numbers, one per column", columns.len()));
@@ -369,10 +538,16 @@ fn multi_angle(field: &Field, limits: &Limits, warnings: &mut Vec<String>) -> Re
         let number = |f: &Field| f.number(-1e6, 1e6, "a number from -1000000 to 1000000");
         let angle = cells[0].number(-90.0, 180.0, "an aspecular angle from -90 to 180 degrees")?;
         let rest = cells[1..].iter().map(number);
-        rows.push(std::iter::once(Ok(angle)).chain(rest).collect::<Result<Vec<f64>, _>>()?);
+        rows.push(
+            std::iter::once(Ok(angle))
+                .chain(rest)
+                .collect::<Result<Vec<f64>, _>>()?,
+        );
     }
     Ok(MultiAngle {
-        illumination_deg: field.want("illumination_deg", "0 to 90")?.number(0.0, 90.0, "0 to 90")?,
+        illumination_deg: field
+            .want("illumination_deg", "0 to 90")?
+            .number(0.0, 90.0, "0 to 90")?,
         illuminant: match illuminant.text()? {
             "D65" => Illuminant::D65,
             "D50" => Illuminant::D50,

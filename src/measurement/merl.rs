@@ -13,7 +13,13 @@ const DIMENSIONS: [i32; 3] = [90, 90, 180];
 pub(super) const FILE_BYTES: usize = 12 + 24 * ENTRIES;
 
 fn dimensions(bytes: &[u8]) -> Option<[i32; 3]> {
-    let at = |k: usize| bytes.get(4 * k..4 * k + 4)?.try_into().ok().map(i32::from_le_bytes);
+    let at = |k: usize| {
+        bytes
+            .get(4 * k..4 * k + 4)?
+            .try_into()
+            .ok()
+            .map(i32::from_le_bytes)
+    };
     Some([at(0)?, at(1)?, at(2)?])
 }
 
@@ -27,8 +33,14 @@ pub(super) fn begins_like_one(bytes: &[u8]) -> bool {
 ///
 /// [`TableError`] for other dimensions, another length, or no valid entry at all.
 pub fn read_merl(bytes: &[u8], spacing: ThetaHSpacing) -> Result<HalfAngleTable, TableError> {
-    let wrong = TableError::Length { layout: "MERL", wanted: FILE_BYTES as u64, bytes: bytes.len() };
-    let Some(found) = dimensions(bytes) else { return Err(wrong) };
+    let wrong = TableError::Length {
+        layout: "MERL",
+        wanted: FILE_BYTES as u64,
+        bytes: bytes.len(),
+    };
+    let Some(found) = dimensions(bytes) else {
+        return Err(wrong);
+    };
     if found != DIMENSIONS {
         return Err(TableError::Dimensions(found));
     }
@@ -37,15 +49,26 @@ pub fn read_merl(bytes: &[u8], spacing: ThetaHSpacing) -> Result<HalfAngleTable,
     }
     let value = |index: usize, channel: usize| {
         let at = 12 + 8 * (channel * ENTRIES + index);
-        bytes.get(at..at + 8)?.try_into().ok().map(f64::from_le_bytes).filter(|v| *v >= 0.0)
+        bytes
+            .get(at..at + 8)?
+            .try_into()
+            .ok()
+            .map(f64::from_le_bytes)
+            .filter(|v| *v >= 0.0)
     };
     let entry = |index: usize| {
-        let rgb = [value(index, 0)? * SCALE[0], value(index, 1)? * SCALE[1], value(index, 2)? * SCALE[2]];
-        #[allow(clippy::cast_possible_truncation)] // Measured to three digits; a value that overflows is invalid.
+        let rgb = [
+            value(index, 0)? * SCALE[0],
+            value(index, 1)? * SCALE[1],
+            value(index, 2)? * SCALE[2],
+        ];
+        #[allow(clippy::cast_possible_truncation)]
+        // Measured to three digits; a value that overflows is invalid.
         Some(rgb.map(|v| v as f32))
     };
-    let entries = (0..PHI_D)
-        .flat_map(|phi| (0..THETA_H).flat_map(move |h| (0..THETA_D).map(move |d| phi + PHI_D * (d + THETA_D * h))));
+    let entries = (0..PHI_D).flat_map(|phi| {
+        (0..THETA_H).flat_map(move |h| (0..THETA_D).map(move |d| phi + PHI_D * (d + THETA_D * h)))
+    });
     HalfAngleTable::new(spacing, entries.map(entry))
 }
 
@@ -70,7 +93,10 @@ mod tests {
 
     fn pair(h_deg: f64, d_deg: f64) -> (Direction, Direction) {
         let (h, d) = (h_deg.to_radians(), d_deg.to_radians());
-        ([(h + d).sin(), 0.0, (h + d).cos()], [(h - d).sin(), 0.0, (h - d).cos()])
+        (
+            [(h + d).sin(), 0.0, (h + d).cos()],
+            [(h - d).sin(), 0.0, (h - d).cos()],
+        )
     }
 
     #[test]
@@ -100,11 +126,17 @@ mod tests {
     #[test]
     fn other_dimensions_and_a_cut_file_are_named() {
         let mut bytes = vec![0; 40];
-        assert_eq!(read_merl(&bytes, ThetaHSpacing::SquareRoot), Err(TableError::Dimensions([0, 0, 0])));
+        assert_eq!(
+            read_merl(&bytes, ThetaHSpacing::SquareRoot),
+            Err(TableError::Dimensions([0, 0, 0]))
+        );
         for (k, d) in DIMENSIONS.iter().enumerate() {
             bytes[4 * k..4 * k + 4].copy_from_slice(&d.to_le_bytes());
         }
-        assert!(matches!(read_merl(&bytes, ThetaHSpacing::SquareRoot), Err(TableError::Length { bytes: 40, .. })));
+        assert!(matches!(
+            read_merl(&bytes, ThetaHSpacing::SquareRoot),
+            Err(TableError::Length { bytes: 40, .. })
+        ));
         assert!(read_merl(&[], ThetaHSpacing::SquareRoot).is_err());
     }
 }

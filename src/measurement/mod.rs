@@ -20,7 +20,10 @@ mod tensor;
 
 pub use merl::read_merl;
 pub use mpi::{MPI_HEADER_BYTES, read_mpi};
-pub use package::{FlakePictures, FlakeSlices, MultiAngle, Package, PackageBase, PackageError, SliceRoom, TableLayout};
+pub use package::{
+    FlakePictures, FlakeSlices, MultiAngle, Package, PackageBase, PackageError, SliceRoom,
+    TableLayout,
+};
 pub use picture::{Picture, PictureError, PictureScratch};
 pub use rgl::{RglError, RglMeasurement};
 pub(crate) use table::half_frame_pair;
@@ -129,7 +132,10 @@ pub fn sniff(bytes: &[u8], options: &ReadOptions) -> Result<Layout, MeasurementE
     } else if bytes.len() == merl::FILE_BYTES || merl::begins_like_one(bytes) {
         Ok(Layout::Merl)
     } else {
-        Err(MeasurementError::Unknown { bytes: bytes.len(), begin: bytes.iter().take(8).copied().collect() })
+        Err(MeasurementError::Unknown {
+            bytes: bytes.len(),
+            begin: bytes.iter().take(8).copied().collect(),
+        })
     }
 }
 
@@ -139,17 +145,31 @@ impl BrdfMeasurement {
     /// # Errors
     ///
     /// [`MeasurementError`] when the layout is unknown or the file is damaged, too large, or a package.
-    pub fn read(bytes: &[u8], options: &ReadOptions, limits: &Limits) -> Result<Self, MeasurementError> {
+    pub fn read(
+        bytes: &[u8],
+        options: &ReadOptions,
+        limits: &Limits,
+    ) -> Result<Self, MeasurementError> {
         if bytes.len() as u64 > limits.bytes {
-            return Err(MeasurementError::Size { bytes: bytes.len(), accepted: limits.bytes });
+            return Err(MeasurementError::Size {
+                bytes: bytes.len(),
+                accepted: limits.bytes,
+            });
         }
         Ok(match sniff(bytes, options)? {
             Layout::Rgl => Self::Rgl(RglMeasurement::read(bytes)?),
             Layout::Mpi2005 => {
                 let header = options.header_bytes.unwrap_or(MPI_HEADER_BYTES);
-                Self::Table(read_mpi(bytes, header, options.theta_h.unwrap_or(ThetaHSpacing::Linear))?)
+                Self::Table(read_mpi(
+                    bytes,
+                    header,
+                    options.theta_h.unwrap_or(ThetaHSpacing::Linear),
+                )?)
             }
-            Layout::Merl => Self::Table(read_merl(bytes, options.theta_h.unwrap_or(ThetaHSpacing::SquareRoot))?),
+            Layout::Merl => Self::Table(read_merl(
+                bytes,
+                options.theta_h.unwrap_or(ThetaHSpacing::SquareRoot),
+            )?),
             Layout::Package => return Err(MeasurementError::Package),
         })
     }
@@ -199,23 +219,43 @@ mod tests {
 
     #[test]
     fn a_text_file_is_refused_with_its_length_and_first_bytes() {
-        let error = BrdfMeasurement::read(b"hello, paint", &ReadOptions::default(), &Limits::default());
+        let error =
+            BrdfMeasurement::read(b"hello, paint", &ReadOptions::default(), &Limits::default());
         let text = error.expect_err("no measurement").to_string();
         assert!(text.contains("12 bytes") && text.contains("68"), "{text}");
     }
 
     #[test]
     fn the_stated_layout_wins_over_the_bytes() {
-        let options = ReadOptions { layout: Some(Layout::Merl), ..ReadOptions::default() };
+        let options = ReadOptions {
+            layout: Some(Layout::Merl),
+            ..ReadOptions::default()
+        };
         assert_eq!(sniff(b"tensor_file\0", &options), Ok(Layout::Merl));
-        assert_eq!(sniff(b"tensor_file\0", &ReadOptions::default()), Ok(Layout::Rgl));
-        assert_eq!(sniff(b"PK\x03\x04", &ReadOptions::default()), Ok(Layout::Package));
+        assert_eq!(
+            sniff(b"tensor_file\0", &ReadOptions::default()),
+            Ok(Layout::Rgl)
+        );
+        assert_eq!(
+            sniff(b"PK\x03\x04", &ReadOptions::default()),
+            Ok(Layout::Package)
+        );
     }
 
     #[test]
     fn more_bytes_than_the_limit_are_refused() {
-        let limits = Limits { bytes: 4, ..Limits::default() };
-        let error = BrdfMeasurement::read(b"hello", &ReadOptions::default(), &limits).expect_err("too long");
-        assert_eq!(error, MeasurementError::Size { bytes: 5, accepted: 4 });
+        let limits = Limits {
+            bytes: 4,
+            ..Limits::default()
+        };
+        let error = BrdfMeasurement::read(b"hello", &ReadOptions::default(), &limits)
+            .expect_err("too long");
+        assert_eq!(
+            error,
+            MeasurementError::Size {
+                bytes: 5,
+                accepted: 4
+            }
+        );
     }
 }

@@ -16,20 +16,37 @@ pub(super) const VALUE_BYTES: u64 = 12 * ENTRIES as u64;
 /// # Errors
 ///
 /// [`TableError::Length`] when the file has another length, [`TableError::AllInvalid`] when it holds nothing.
-pub fn read_mpi(bytes: &[u8], header_bytes: u64, spacing: ThetaHSpacing) -> Result<HalfAngleTable, TableError> {
+pub fn read_mpi(
+    bytes: &[u8],
+    header_bytes: u64,
+    spacing: ThetaHSpacing,
+) -> Result<HalfAngleTable, TableError> {
     let wanted = VALUE_BYTES.saturating_add(header_bytes);
-    let wrong = TableError::Length { layout: "MPI 2005", wanted, bytes: bytes.len() };
+    let wrong = TableError::Length {
+        layout: "MPI 2005",
+        wanted,
+        bytes: bytes.len(),
+    };
     if bytes.len() as u64 != wanted {
         return Err(wrong);
     }
-    let Some(values) = usize::try_from(header_bytes).ok().and_then(|start| bytes.get(start..)) else {
+    let Some(values) = usize::try_from(header_bytes)
+        .ok()
+        .and_then(|start| bytes.get(start..))
+    else {
         return Err(wrong);
     };
     HalfAngleTable::new(spacing, values.chunks_exact(12).map(entry))
 }
 
 fn entry(bytes: &[u8]) -> Option<[f32; 3]> {
-    let channel = |k: usize| bytes.get(4 * k..4 * k + 4)?.try_into().ok().map(f32::from_le_bytes);
+    let channel = |k: usize| {
+        bytes
+            .get(4 * k..4 * k + 4)?
+            .try_into()
+            .ok()
+            .map(f32::from_le_bytes)
+    };
     let rgb = [channel(0)?, channel(1)?, channel(2)?];
     (rgb != [-1.0; 3]).then_some(rgb)
 }
@@ -65,17 +82,32 @@ mod tests {
     fn the_order_is_phi_then_theta_h_then_theta_d() {
         // Green counts θh bins, red θd bins: read back at (θh, θd) = (30.5°, 10.5°).
         let count = |k: usize| f32::from(u16::try_from(k).expect("small"));
-        let table = read_mpi(&file(0, |k| [count(k % 90), count(k / 90 % 90), 1.0]), 0, ThetaHSpacing::Linear);
+        let table = read_mpi(
+            &file(0, |k| [count(k % 90), count(k / 90 % 90), 1.0]),
+            0,
+            ThetaHSpacing::Linear,
+        );
         let (h, d) = (30.5_f64.to_radians(), 10.5_f64.to_radians());
-        let (wi, wo) = ([(h + d).sin(), 0.0, (h + d).cos()], [(h - d).sin(), 0.0, (h - d).cos()]);
+        let (wi, wo) = (
+            [(h + d).sin(), 0.0, (h + d).cos()],
+            [(h - d).sin(), 0.0, (h - d).cos()],
+        );
         let rgb = table.expect("whole").reflectance(wi, wo).expect("valid");
-        assert!((rgb[0] - 10.0).abs() < 1e-6 && (rgb[1] - 30.0).abs() < 1e-6, "{rgb:?}");
+        assert!(
+            (rgb[0] - 10.0).abs() < 1e-6 && (rgb[1] - 30.0).abs() < 1e-6,
+            "{rgb:?}"
+        );
     }
 
     #[test]
     fn a_cut_file_is_refused_with_both_lengths() {
-        let error = read_mpi(&[0; 100], 84, ThetaHSpacing::Linear).expect_err("cut").to_string();
-        assert!(error.contains("17496084") && error.contains("100"), "{error}");
+        let error = read_mpi(&[0; 100], 84, ThetaHSpacing::Linear)
+            .expect_err("cut")
+            .to_string();
+        assert!(
+            error.contains("17496084") && error.contains("100"),
+            "{error}"
+        );
         assert!(read_mpi(&[0; 100], u64::MAX, ThetaHSpacing::Linear).is_err());
     }
 }

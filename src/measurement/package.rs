@@ -170,7 +170,9 @@ pub enum PackageError {
         accepted: String,
     },
     /// A package of a later format.
-    #[error("{MANIFEST}: version is {found}, this carpaint reads up to version {known}: update carpaint")]
+    #[error(
+        "{MANIFEST}: version is {found}, this carpaint reads up to version {known}: update carpaint"
+    )]
     Newer {
         /// Version of the package.
         found: u64,
@@ -239,25 +241,58 @@ impl Package {
         let manifest = Manifest::parse(&bytes, limits)?;
         let base = match manifest.base {
             None => None,
-            Some(BaseEntry::Model { diffuse, lobes, color_table }) => {
-                let table = color_table.map(|entry| color_table_of(&archive, entry, limits)).transpose()?;
-                Some(PackageBase::Model { diffuse, lobes, color_table: table.unwrap_or_else(ColorTable::white) })
+            Some(BaseEntry::Model {
+                diffuse,
+                lobes,
+                color_table,
+            }) => {
+                let table = color_table
+                    .map(|entry| color_table_of(&archive, entry, limits))
+                    .transpose()?;
+                Some(PackageBase::Model {
+                    diffuse,
+                    lobes,
+                    color_table: table.unwrap_or_else(ColorTable::white),
+                })
             }
-            Some(BaseEntry::Table { file, layout, header_bytes }) => {
+            Some(BaseEntry::Table {
+                file,
+                layout,
+                header_bytes,
+            }) => {
                 let mut bytes = Vec::new();
                 archive.read(&file, (64 << 20) + header_bytes, &mut bytes)?;
-                Some(PackageBase::Table { file, bytes, layout, header_bytes })
+                Some(PackageBase::Table {
+                    file,
+                    bytes,
+                    layout,
+                    header_bytes,
+                })
             }
         };
-        let flakes = manifest.flakes.map(|entry| FlakeSlices { archive, entry, limits: *limits });
+        let flakes = manifest.flakes.map(|entry| FlakeSlices {
+            archive,
+            entry,
+            limits: *limits,
+        });
         if let Some(flakes) = &flakes {
-            let missing = (0..flakes.slices()).map(|k| flakes.name(k)).find(|name| !flakes.archive.holds(name));
+            let missing = (0..flakes.slices())
+                .map(|k| flakes.name(k))
+                .find(|name| !flakes.archive.holds(name));
             if let Some(file) = missing {
                 return Err(PackageError::Missing { file });
             }
         }
         let (name, notes, coat) = (manifest.name, manifest.notes, manifest.coat);
-        Ok(Self { name, notes, coat, base, flakes, multi_angle: manifest.multi_angle, warnings: manifest.warnings })
+        Ok(Self {
+            name,
+            notes,
+            coat,
+            base,
+            flakes,
+            multi_angle: manifest.multi_angle,
+            warnings: manifest.warnings,
+        })
     }
 }
 
@@ -266,23 +301,39 @@ fn picture_bytes(size: [u32; 2]) -> u64 {
     64 * u64::from(size[0]) * u64::from(size[1]) + (1 << 20)
 }
 
-fn color_table_of(archive: &Archive, entry: TableEntry, limits: &Limits) -> Result<ColorTable, PackageError> {
-    let TableEntry { file, theta_h, theta_d } = entry;
+fn color_table_of(
+    archive: &Archive,
+    entry: TableEntry,
+    limits: &Limits,
+) -> Result<ColorTable, PackageError> {
+    let TableEntry {
+        file,
+        theta_h,
+        theta_d,
+    } = entry;
     let side = |grid: &AngleGrid| u32::try_from(grid.len()).unwrap_or(u32::MAX);
     let size = [side(&theta_d), side(&theta_h)];
     let mut bytes = Vec::new();
     archive.read(&file, picture_bytes(size), &mut bytes)?;
     let picture = Picture::read_exr(&bytes, Some(size), limits, &mut PictureScratch::default());
-    let picture = picture.map_err(|source| PackageError::Picture { file: file.clone(), source })?;
-    let colors = (0..picture.pixels()).map(|k| picture.planes.each_ref().map(|plane| f64::from(plane[k])));
+    let picture = picture.map_err(|source| PackageError::Picture {
+        file: file.clone(),
+        source,
+    })?;
+    let colors =
+        (0..picture.pixels()).map(|k| picture.planes.each_ref().map(|plane| f64::from(plane[k])));
     let nodes: Vec<Lab> = colors.map(Lab::from_rgb).collect();
-    if let Some(k) = nodes.iter().position(|lab| lab.to_array().iter().any(|v| v.abs() > MAX_LAB)) {
+    if let Some(k) = nodes
+        .iter()
+        .position(|lab| lab.to_array().iter().any(|v| v.abs() > MAX_LAB))
+    {
         let (row, column) = (k / theta_d.len(), k % theta_d.len());
         let reason = format!("the color at row {row}, column {column} is beyond 2000 in L, a or b");
         return Err(PackageError::Damaged { file, reason });
     }
     let overall = overall_color(&theta_h, &theta_d, &nodes);
-    ColorTable::new(theta_h, theta_d, nodes, overall).map_err(|source| PackageError::ColorTable { file, source })
+    ColorTable::new(theta_h, theta_d, nodes, overall)
+        .map_err(|source| PackageError::ColorTable { file, source })
 }
 
 /// Mean of a table in linear light, each angle with the share of the axis that is nearest to it.
@@ -290,7 +341,11 @@ fn overall_color(theta_h: &AngleGrid, theta_d: &AngleGrid, nodes: &[Lab]) -> Lab
     let shares = |grid: &AngleGrid| -> Vec<f64> {
         let d = grid.degrees();
         let share = |k: usize| d[(k + 1).min(d.len() - 1)] - d[k.saturating_sub(1)];
-        if d.len() == 1 { vec![1.0] } else { (0..d.len()).map(share).collect() }
+        if d.len() == 1 {
+            vec![1.0]
+        } else {
+            (0..d.len()).map(share).collect()
+        }
     };
     let (rows, columns) = (shares(theta_h), shares(theta_d));
     let (mut sum, mut weight) = ([0.0; 3], 0.0);
@@ -318,7 +373,11 @@ impl FlakeSlices {
                 let mut sum = [0.0; 3];
                 let mut count = 0.0;
                 for texel in 0..room.picture.pixels() {
-                    let color = room.picture.planes.each_ref().map(|plane| f64::from(plane[texel]));
+                    let color = room
+                        .picture
+                        .planes
+                        .each_ref()
+                        .map(|plane| f64::from(plane[texel]));
                     if color.iter().all(|v| v.is_finite()) {
                         count += 1.0;
                         for k in 0..3 {
@@ -350,13 +409,22 @@ impl FlakePictures for FlakeSlices {
     }
 
     fn name(&self, slice: usize) -> String {
-        self.entry.pattern.name(slice / self.entry.theta_d.len(), slice % self.entry.theta_d.len())
+        self.entry.pattern.name(
+            slice / self.entry.theta_d.len(),
+            slice % self.entry.theta_d.len(),
+        )
     }
 
     fn read(&self, slice: usize, room: &mut SliceRoom) -> Result<(), PackageError> {
         let file = self.name(slice);
-        self.archive.read(&file, picture_bytes(self.entry.size), &mut room.bytes)?;
-        let decoded = room.picture.decode_exr(&room.bytes, Some(self.entry.size), &self.limits, &mut room.scratch);
+        self.archive
+            .read(&file, picture_bytes(self.entry.size), &mut room.bytes)?;
+        let decoded = room.picture.decode_exr(
+            &room.bytes,
+            Some(self.entry.size),
+            &self.limits,
+            &mut room.scratch,
+        );
         if let Err(source) = decoded {
             return Err(PackageError::Picture { file, source });
         }

@@ -80,7 +80,11 @@ pub struct PictureScratch {
 
 impl Default for PictureScratch {
     fn default() -> Self {
-        Self { inflater: libdeflater::Decompressor::new(), packed: Vec::new(), halves: Vec::new() }
+        Self {
+            inflater: libdeflater::Decompressor::new(),
+            packed: Vec::new(),
+            halves: Vec::new(),
+        }
     }
 }
 
@@ -173,9 +177,15 @@ impl Header {
                 break;
             }
             front.name().ok_or(CUT)?;
-            let size = front.i32().and_then(|n| usize::try_from(n).ok()).ok_or(CUT)?;
+            let size = front
+                .i32()
+                .and_then(|n| usize::try_from(n).ok())
+                .ok_or(CUT)?;
             let value = front.take(size).ok_or(CUT)?;
-            let mut value = Front { bytes: value, position: 0 };
+            let mut value = Front {
+                bytes: value,
+                position: 0,
+            };
             match name {
                 b"channels" => channels = Some(read_channels(&mut value)?),
                 b"compression" => compression = value.chunk::<1>().map(|[c]| c),
@@ -190,19 +200,29 @@ impl Header {
         let compression = compression.ok_or(PictureError::Header("it names no compression"))?;
         if compression > B44A {
             // exr 1.74 reserves whatever a damaged DWA block claims before it looks at the data.
-            return Err(kind(format!("packed by method {compression} (DWA or unknown)")));
+            return Err(kind(format!(
+                "packed by method {compression} (DWA or unknown)"
+            )));
         }
         let [x0, y0, x1, y1] = window.ok_or(PictureError::Header("it has no data window"))?;
         let (width, height) = (x1 - x0 + 1, y1 - y0 + 1);
         if let Some(wanted) = wanted
             && (width, height) != (i64::from(wanted[0]), i64::from(wanted[1]))
         {
-            return Err(PictureError::Size { width, height, wanted });
+            return Err(PictureError::Size {
+                width,
+                height,
+                wanted,
+            });
         }
         let side = |s: i64| usize::try_from(s).ok().filter(|s| *s > 0 && *s < 1 << 24);
         let area = width.unsigned_abs().saturating_mul(height.unsigned_abs());
         let (Some(w), Some(h), true) = (side(width), side(height), area <= limits.pixels) else {
-            return Err(PictureError::TooLarge { width, height, accepted: limits.pixels });
+            return Err(PictureError::TooLarge {
+                width,
+                height,
+                accepted: limits.pixels,
+            });
         };
         Ok(Self {
             channels,
@@ -217,7 +237,10 @@ impl Header {
 
     /// Bytes of one row, all channels.
     fn row_bytes(&self) -> usize {
-        self.channels.iter().map(|(kind, _)| kind.bytes() * self.width).sum()
+        self.channels
+            .iter()
+            .map(|(kind, _)| kind.bytes() * self.width)
+            .sum()
     }
 
     /// Rows of a block, where this file can be decoded here.
@@ -251,8 +274,13 @@ fn read_channels(value: &mut Front) -> Result<Vec<(PixelType, Option<usize>)>, P
         };
         value.take(4).ok_or(CUT)?;
         let sampling = (value.i32().ok_or(CUT)?, value.i32().ok_or(CUT)?);
-        if sampling != (1, 1) || (plane.is_some() && kind == PixelType::Uint) || channels.len() >= 64 {
-            return Err(PictureError::Kind { found: "a picture with subsampled, integer or too many channels".into() });
+        if sampling != (1, 1)
+            || (plane.is_some() && kind == PixelType::Uint)
+            || channels.len() >= 64
+        {
+            return Err(PictureError::Kind {
+                found: "a picture with subsampled, integer or too many channels".into(),
+            });
         }
         if plane.is_some() && channels.iter().any(|(_, p)| *p == plane) {
             return Err(PictureError::Header("a channel is named twice"));
@@ -260,7 +288,9 @@ fn read_channels(value: &mut Front) -> Result<Vec<(PixelType, Option<usize>)>, P
         channels.push((kind, plane));
     }
     if channels.iter().filter(|(_, plane)| plane.is_some()).count() != 3 {
-        return Err(PictureError::Kind { found: "a picture without one of the channels R, G, B".into() });
+        return Err(PictureError::Kind {
+            found: "a picture without one of the channels R, G, B".into(),
+        });
     }
     Ok(channels)
 }
@@ -299,26 +329,44 @@ impl Picture {
         // No compression packs a pixel's six bytes denser than zlib's 1032:1: no memory for empty promises.
         let pixels = header.width * header.height;
         if pixels / 170 > bytes.len() {
-            return Err(PictureError::Header("it promises more pixels than its bytes can hold"));
+            return Err(PictureError::Header(
+                "it promises more pixels than its bytes can hold",
+            ));
         }
-        let Some(rows) = header.rows_per_block() else { return self.decode_general(bytes, &header) };
+        let Some(rows) = header.rows_per_block() else {
+            return self.decode_general(bytes, &header);
+        };
         for plane in &mut self.planes {
             plane.clear();
             plane.resize(pixels, 0.0);
         }
         let blocks = header.height.div_ceil(rows);
-        let table = blocks.checked_mul(8).and_then(|n| bytes.get(header.end..header.end.checked_add(n)?));
+        let table = blocks
+            .checked_mul(8)
+            .and_then(|n| bytes.get(header.end..header.end.checked_add(n)?));
         let table = table.ok_or(PictureError::Header("its offset table is cut short"))?;
         let mut seen = vec![false; blocks];
         for (block, offset) in table.chunks_exact(8).enumerate() {
-            let damaged = |reason: &str| PictureError::Block { block, reason: reason.into() };
+            let damaged = |reason: &str| PictureError::Block {
+                block,
+                reason: reason.into(),
+            };
             let offset = offset.first_chunk().map_or(0, |o| u64::from_le_bytes(*o));
-            let position = usize::try_from(offset).map_err(|_| damaged("it lies outside the file"))?;
+            let position =
+                usize::try_from(offset).map_err(|_| damaged("it lies outside the file"))?;
             let mut chunk = Front { bytes, position };
-            let row = i64::from(chunk.i32().ok_or_else(|| damaged("it lies outside the file"))?) - header.rows_from;
+            let row = i64::from(
+                chunk
+                    .i32()
+                    .ok_or_else(|| damaged("it lies outside the file"))?,
+            ) - header.rows_from;
             let size = chunk.i32().and_then(|n| usize::try_from(n).ok());
-            let data = size.and_then(|n| chunk.take(n)).ok_or_else(|| damaged("it is cut short"))?;
-            let row = usize::try_from(row).ok().filter(|r| *r < header.height && r % rows == 0);
+            let data = size
+                .and_then(|n| chunk.take(n))
+                .ok_or_else(|| damaged("it is cut short"))?;
+            let row = usize::try_from(row)
+                .ok()
+                .filter(|r| *r < header.height && r % rows == 0);
             let row = row.ok_or_else(|| damaged("it begins at a row that no block begins at"))?;
             if std::mem::replace(&mut seen[row / rows], true) {
                 return Err(damaged("another block has the same rows"));
@@ -331,7 +379,10 @@ impl Picture {
                 return Err(damaged("it has another length than its rows"));
             } else {
                 scratch.packed.resize(size, 0);
-                match scratch.inflater.zlib_decompress(data, &mut scratch.packed[..size]) {
+                match scratch
+                    .inflater
+                    .zlib_decompress(data, &mut scratch.packed[..size])
+                {
                     Ok(length) if length == size => {}
                     Ok(_) => return Err(damaged("it inflates to another length than its rows")),
                     Err(error) => return Err(damaged(&format!("it does not inflate: {error}"))),
@@ -348,7 +399,10 @@ impl Picture {
         let mut rest = data;
         for y in row.. {
             for (kind, plane) in &header.channels {
-                let Some((values, tail)) = rest.split_at_checked(kind.bytes() * header.width) else { return };
+                let Some((values, tail)) = rest.split_at_checked(kind.bytes() * header.width)
+                else {
+                    return;
+                };
                 rest = tail;
                 let Some(plane) = plane else { continue };
                 let target = &mut self.planes[*plane][y * header.width..][..header.width];
@@ -369,7 +423,13 @@ impl Picture {
     }
 
     /// The same for rows whose even bytes stand before their odd ones.
-    fn place_split(&mut self, data: &[u8], row: usize, header: &Header, halves: &mut Vec<half::f16>) {
+    fn place_split(
+        &mut self,
+        data: &[u8],
+        row: usize,
+        header: &Header,
+        halves: &mut Vec<half::f16>,
+    ) {
         let (even, odd) = data.split_at(data.len().div_ceil(2));
         let (width, mut at, mut y) = (header.width, 0, row);
         while at < odd.len() {
@@ -381,8 +441,11 @@ impl Picture {
                 let target = &mut self.planes[*plane][y * width..][..width];
                 if *kind == PixelType::Half {
                     halves.clear();
-                    halves
-                        .extend(low.iter().zip(high).map(|(&l, &h)| half::f16::from_bits(u16::from_le_bytes([l, h]))));
+                    halves.extend(
+                        low.iter()
+                            .zip(high)
+                            .map(|(&l, &h)| half::f16::from_bits(u16::from_le_bytes([l, h]))),
+                    );
                     half::slice::HalfFloatSliceExt::convert_to_f32_slice(&halves[..], target);
                 } else {
                     let pairs = low.chunks_exact(2).zip(high.chunks_exact(2));
@@ -408,7 +471,19 @@ impl Picture {
             .no_deep_data()
             .largest_resolution_level()
             .rgb_channels(
-                move |size, _| (size, vec![[0.0_f32; 3]; if size == Vec2(width, height) { width * height } else { 0 }]),
+                move |size, _| {
+                    (
+                        size,
+                        vec![
+                            [0.0_f32; 3];
+                            if size == Vec2(width, height) {
+                                width * height
+                            } else {
+                                0
+                            }
+                        ],
+                    )
+                },
                 |(size, pixels), at, (r, g, b): (f32, f32, f32)| {
                     if let Some(pixel) = pixels.get_mut(at.y() * size.width() + at.x()) {
                         *pixel = [r, g, b];
@@ -435,7 +510,8 @@ impl Picture {
     pub fn dead(&self) -> usize {
         let [red, green, blue] = &self.planes;
         // x · 0 is 0 for every finite x and NaN for every other: a sum that needs no branch.
-        let dead = |((r, g), b): ((&f32, &f32), &f32)| usize::from((r * 0.0 + g * 0.0 + b * 0.0) != 0.0);
+        let dead =
+            |((r, g), b): ((&f32, &f32), &f32)| usize::from((r * 0.0 + g * 0.0 + b * 0.0) != 0.0);
         red.iter().zip(green).zip(blue).map(dead).sum()
     }
 
@@ -477,7 +553,9 @@ const fn add_bytes(a: u64, b: u64) -> u64 {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use exr::prelude::{Blocks, Compression, Encoding, Image, LineOrder, SpecificChannels, Vec2, WritableImage};
+    use exr::prelude::{
+        Blocks, Compression, Encoding, Image, LineOrder, SpecificChannels, Vec2, WritableImage,
+    };
 
     /// A pixel of a picture of half floats, with everything in it that measurements have.
     fn pixel(x: usize, y: usize) -> [f32; 3] {
@@ -498,31 +576,57 @@ pub(super) mod tests {
         line_order: LineOrder,
         pixel: impl Fn(usize, usize) -> (S, S, S) + Sync,
     ) -> Vec<u8> {
-        let encoding = Encoding { compression, blocks, line_order };
+        let encoding = Encoding {
+            compression,
+            blocks,
+            line_order,
+        };
         let channels = SpecificChannels::rgb(move |at: Vec2<usize>| pixel(at.x(), at.y()));
         let mut bytes = Vec::new();
         let image = Image::from_encoded_channels((size[0], size[1]), encoding, channels);
-        image.write().non_parallel().to_buffered(std::io::Cursor::new(&mut bytes)).expect("a picture");
+        image
+            .write()
+            .non_parallel()
+            .to_buffered(std::io::Cursor::new(&mut bytes))
+            .expect("a picture");
         bytes
     }
 
-    pub(in super::super) fn halves(size: [usize; 2], pixel: impl Fn(usize, usize) -> [f32; 3] + Sync) -> Vec<u8> {
-        exr_of(size, Compression::ZIP16, Blocks::ScanLines, LineOrder::Increasing, |x, y| {
-            let [r, g, b] = pixel(x, y).map(half::f16::from_f32);
-            (r, g, b)
-        })
+    pub(in super::super) fn halves(
+        size: [usize; 2],
+        pixel: impl Fn(usize, usize) -> [f32; 3] + Sync,
+    ) -> Vec<u8> {
+        exr_of(
+            size,
+            Compression::ZIP16,
+            Blocks::ScanLines,
+            LineOrder::Increasing,
+            |x, y| {
+                let [r, g, b] = pixel(x, y).map(half::f16::from_f32);
+                (r, g, b)
+            },
+        )
     }
 
     fn read(bytes: &[u8], wanted: Option<[u32; 2]>) -> Result<Picture, PictureError> {
-        Picture::read_exr(bytes, wanted, &Limits::default(), &mut PictureScratch::default())
+        Picture::read_exr(
+            bytes,
+            wanted,
+            &Limits::default(),
+            &mut PictureScratch::default(),
+        )
     }
 
     #[test]
     fn every_way_of_packing_gives_the_same_pixels() {
         let size = [37, 41];
         let tiles = Blocks::Tiles(Vec2(16, 16));
-        let (none, zips, zip, piz) =
-            (Compression::Uncompressed, Compression::ZIP1, Compression::ZIP16, Compression::PIZ);
+        let (none, zips, zip, piz) = (
+            Compression::Uncompressed,
+            Compression::ZIP1,
+            Compression::ZIP16,
+            Compression::PIZ,
+        );
         for (compression, blocks) in [
             (none, Blocks::ScanLines),
             (zips, Blocks::ScanLines),
@@ -540,17 +644,30 @@ pub(super) mod tests {
                     let [r, g, b] = pixel(x, y).map(half::f16::from_f32);
                     (r, g, b)
                 };
-                let order = if blocks == tiles { LineOrder::Increasing } else { order };
-                let (floats, halves) =
-                    (exr_of(size, compression, blocks, order, float), exr_of(size, compression, blocks, order, half));
+                let order = if blocks == tiles {
+                    LineOrder::Increasing
+                } else {
+                    order
+                };
+                let (floats, halves) = (
+                    exr_of(size, compression, blocks, order, float),
+                    exr_of(size, compression, blocks, order, half),
+                );
                 for (bytes, is_half) in [(floats, false), (halves, true)] {
                     let picture = read(&bytes, Some([37, 41])).expect("whole");
                     for k in 0..37 * 41 {
                         let want = pixel(k % 37, k / 37);
                         for c in 0..3 {
-                            let want = if is_half { half::f16::from_f32(want[c]).to_f32() } else { want[c] };
+                            let want = if is_half {
+                                half::f16::from_f32(want[c]).to_f32()
+                            } else {
+                                want[c]
+                            };
                             let got = picture.planes[c][k];
-                            assert!(got == want || got.is_nan() && want.is_nan(), "{compression:?} {k}: {got} {want}");
+                            assert!(
+                                got == want || got.is_nan() && want.is_nan(),
+                                "{compression:?} {k}: {got} {want}"
+                            );
                         }
                     }
                 }
@@ -562,11 +679,26 @@ pub(super) mod tests {
     fn the_size_is_held_against_what_was_promised() {
         let bytes = halves([8, 4], |_, _| [0.5; 3]);
         assert_eq!(read(&bytes, None).expect("whole").pixels(), 32);
-        let error = read(&bytes, Some([4, 8])).expect_err("another size").to_string();
-        assert!(error.contains("8 x 4") && error.contains("4 x 8"), "{error}");
-        let limits = Limits { pixels: 31, ..Limits::default() };
+        let error = read(&bytes, Some([4, 8]))
+            .expect_err("another size")
+            .to_string();
+        assert!(
+            error.contains("8 x 4") && error.contains("4 x 8"),
+            "{error}"
+        );
+        let limits = Limits {
+            pixels: 31,
+            ..Limits::default()
+        };
         let error = Picture::read_exr(&bytes, None, &limits, &mut PictureScratch::default());
-        assert_eq!(error, Err(PictureError::TooLarge { width: 8, height: 4, accepted: 31 }));
+        assert_eq!(
+            error,
+            Err(PictureError::TooLarge {
+                width: 8,
+                height: 4,
+                accepted: 31
+            })
+        );
     }
 
     #[test]
@@ -575,14 +707,22 @@ pub(super) mod tests {
         assert_eq!(read(b"", None), Err(PictureError::Magic));
         let mut multi = halves([2, 2], |_, _| [0.5; 3]);
         multi[5] |= 0x10;
-        assert!(read(&multi, None).expect_err("multi-part").to_string().contains("multi-part"));
+        assert!(
+            read(&multi, None)
+                .expect_err("multi-part")
+                .to_string()
+                .contains("multi-part")
+        );
     }
 
     #[test]
     fn every_cut_is_refused() {
         let bytes = halves([20, 20], pixel);
         for length in 0..bytes.len() {
-            assert!(read(&bytes[..length], Some([20, 20])).is_err(), "cut at {length}");
+            assert!(
+                read(&bytes[..length], Some([20, 20])).is_err(),
+                "cut at {length}"
+            );
         }
     }
 
@@ -594,7 +734,13 @@ pub(super) mod tests {
                 let [r, g, b] = pixel(x, y).map(half::f16::from_f32);
                 (r, g, b)
             };
-            let bytes = exr_of([20, 20], compression, Blocks::ScanLines, LineOrder::Increasing, half);
+            let bytes = exr_of(
+                [20, 20],
+                compression,
+                Blocks::ScanLines,
+                LineOrder::Increasing,
+                half,
+            );
             for k in 0..bytes.len() {
                 for value in [0, 0x7f, 0xff, bytes[k] ^ 1] {
                     let mut changed = bytes.clone();
@@ -610,11 +756,21 @@ pub(super) mod tests {
     #[test]
     fn an_empty_promise_of_many_pixels_reserves_nothing() {
         let mut bytes = halves([2, 2], |_, _| [0.5; 3]);
-        let at = bytes.windows(10).position(|w| w == b"dataWindow").expect("attribute") + 10 + 1 + 6 + 4;
+        let at = bytes
+            .windows(10)
+            .position(|w| w == b"dataWindow")
+            .expect("attribute")
+            + 10
+            + 1
+            + 6
+            + 4;
         bytes[at + 8..at + 12].copy_from_slice(&8191_i32.to_le_bytes());
         bytes[at + 12..at + 16].copy_from_slice(&8191_i32.to_le_bytes());
         let error = read(&bytes, Some([8192, 8192])).expect_err("empty");
-        assert!(error.to_string().contains("more pixels than its bytes"), "{error}");
+        assert!(
+            error.to_string().contains("more pixels than its bytes"),
+            "{error}"
+        );
     }
 
     #[test]

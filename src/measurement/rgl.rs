@@ -96,7 +96,8 @@ impl Extent {
 
     /// Bilinear value in a table of this extent.
     fn bilinear(self, table: &[f32], cell: Cell) -> f64 {
-        let at = |r: usize, c: usize| f64::from(table[(cell.row + r) * self.columns + cell.column + c]);
+        let at =
+            |r: usize, c: usize| f64::from(table[(cell.row + r) * self.columns + cell.column + c]);
         let lower = (1.0 - cell.x) * at(0, 0) + cell.x * at(0, 1);
         let upper = (1.0 - cell.x) * at(1, 0) + cell.x * at(1, 1);
         (1.0 - cell.y) * lower + cell.y * upper
@@ -141,7 +142,11 @@ impl Density {
         }
         let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
         let scaled = |v: Vec<f64>| v.into_iter().map(|x| x * scale).collect();
-        Self { values: raw.iter().map(|&v| f64::from(v) * scale).collect(), along: scaled(along), over: scaled(over) }
+        Self {
+            values: raw.iter().map(|&v| f64::from(v) * scale).collect(),
+            along: scaled(along),
+            over: scaled(over),
+        }
     }
 }
 
@@ -188,15 +193,27 @@ impl RglMeasurement {
         let sigma = surface(&file, "sigma")?;
 
         let (vndf, shape) = finite(&file, "vndf", true)?;
-        let &[p, t, rows, columns] = shape else { return Err(wrong("vndf", shape, "4 dimensions")) };
+        let &[p, t, rows, columns] = shape else {
+            return Err(wrong("vndf", shape, "4 dimensions"));
+        };
         if (p, t) != (phi_i.len(), theta_i.len()) || rows < 2 || columns < 2 {
-            return Err(wrong("vndf", shape, &format!("[{}, {}, 2.., 2..]", phi_i.len(), theta_i.len())));
+            return Err(wrong(
+                "vndf",
+                shape,
+                &format!("[{}, {}, 2.., 2..]", phi_i.len(), theta_i.len()),
+            ));
         }
         let extent = Extent { rows, columns };
         let (colors, shape) = finite(&file, "rgb", false)?;
-        let &[p, t, 3, rows, columns] = shape else { return Err(wrong("rgb", shape, "[.., .., 3, .., ..]")) };
+        let &[p, t, 3, rows, columns] = shape else {
+            return Err(wrong("rgb", shape, "[.., .., 3, .., ..]"));
+        };
         if (p, t) != (phi_i.len(), theta_i.len()) || rows < 2 || columns < 2 {
-            return Err(wrong("rgb", shape, &format!("[{}, {}, 3, 2.., 2..]", phi_i.len(), theta_i.len())));
+            return Err(wrong(
+                "rgb",
+                shape,
+                &format!("[{}, {}, 3, 2.., 2..]", phi_i.len(), theta_i.len()),
+            ));
         }
 
         let weights = trapezoid(&phi_i);
@@ -207,11 +224,16 @@ impl RglMeasurement {
             .map(|((&phi, weight), slices)| Azimuth {
                 phi,
                 weight,
-                densities: slices.chunks_exact(extent.len()).map(|s| Density::new(extent, s)).collect(),
+                densities: slices
+                    .chunks_exact(extent.len())
+                    .map(|s| Density::new(extent, s))
+                    .collect(),
             })
             .collect();
         Ok(Self {
-            description: file.bytes("description").map(|d| String::from_utf8_lossy(d).chars().take(200).collect()),
+            description: file
+                .bytes("description")
+                .map(|d| String::from_utf8_lossy(d).chars().take(200).collect()),
             isotropic: phi_i.len() <= 2,
             theta_i,
             azimuths,
@@ -242,27 +264,58 @@ impl RglMeasurement {
     }
 
     /// `f · o_z` for one azimuth of incidence; `turn` is the azimuth of the half vector from that of the incidence.
-    fn at(&self, index: usize, azimuth: &Azimuth, theta_i: f64, theta_m: f64, turn: f64) -> LinearRgb {
-        let phi_m = if self.isotropic { turn } else { azimuth.phi + turn };
-        let (u, v) = ((theta_m / FRAC_PI_2).sqrt(), ((phi_m + PI) / TAU).rem_euclid(1.0));
-        let low = self.theta_i.partition_point(|&t| t <= theta_i).clamp(1, self.theta_i.len() - 1) - 1;
+    fn at(
+        &self,
+        index: usize,
+        azimuth: &Azimuth,
+        theta_i: f64,
+        theta_m: f64,
+        turn: f64,
+    ) -> LinearRgb {
+        let phi_m = if self.isotropic {
+            turn
+        } else {
+            azimuth.phi + turn
+        };
+        let (u, v) = (
+            (theta_m / FRAC_PI_2).sqrt(),
+            ((phi_m + PI) / TAU).rem_euclid(1.0),
+        );
+        let low = self
+            .theta_i
+            .partition_point(|&t| t <= theta_i)
+            .clamp(1, self.theta_i.len() - 1)
+            - 1;
         let (from, to) = (self.theta_i[low], self.theta_i[low + 1]);
         let weight = ((theta_i - from) / (to - from)).clamp(0.0, 1.0);
 
         let (a, b) = (&azimuth.densities[low], &azimuth.densities[low + 1]);
         let blend = |x: f64, y: f64| (1.0 - weight) * x + weight * y;
-        let Some((x, y)) = self.sample_of(u, v, |table, k| blend(table(a)[k], table(b)[k])) else { return [0.0; 3] };
+        let Some((x, y)) = self.sample_of(u, v, |table, k| blend(table(a)[k], table(b)[k])) else {
+            return [0.0; 3];
+        };
 
         let cell = self.rgb.cell(x, y);
         let channel = |incidence: usize, c: usize| {
             let start = ((index * self.theta_i.len() + incidence) * 3 + c) * self.rgb.len();
-            self.rgb.bilinear(&self.colors[start..start + self.rgb.len()], cell)
+            self.rgb
+                .bilinear(&self.colors[start..start + self.rgb.len()], cell)
         };
         let ndf = self.ndf.0.bilinear(&self.ndf.1, self.ndf.0.cell(u, v));
         let phi_i = if self.isotropic { 0.0 } else { azimuth.phi };
-        let sigma_at = ((theta_i / FRAC_PI_2).sqrt(), ((phi_i + PI) / TAU).rem_euclid(1.0));
-        let sigma = self.sigma.0.bilinear(&self.sigma.1, self.sigma.0.cell(sigma_at.0, sigma_at.1));
-        let scale = if sigma > 0.0 { ndf / (4.0 * sigma) } else { 0.0 };
+        let sigma_at = (
+            (theta_i / FRAC_PI_2).sqrt(),
+            ((phi_i + PI) / TAU).rem_euclid(1.0),
+        );
+        let sigma = self
+            .sigma
+            .0
+            .bilinear(&self.sigma.1, self.sigma.0.cell(sigma_at.0, sigma_at.1));
+        let scale = if sigma > 0.0 {
+            ndf / (4.0 * sigma)
+        } else {
+            0.0
+        };
         std::array::from_fn(|c| blend(channel(low, c), channel(low + 1, c)) * scale)
     }
 
@@ -270,7 +323,12 @@ impl RglMeasurement {
     ///
     /// Within a cell the density is bilinear, so its integral along the row is a quadratic in x, and the row
     /// integrals, linear in y, integrate to a quadratic in y. `None` where the density vanishes along the whole row.
-    fn sample_of(&self, u: f64, v: f64, read: impl Fn(fn(&Density) -> &[f64], usize) -> f64) -> Option<(f64, f64)> {
+    fn sample_of(
+        &self,
+        u: f64,
+        v: f64,
+        read: impl Fn(fn(&Density) -> &[f64], usize) -> f64,
+    ) -> Option<(f64, f64)> {
         let cell = self.vndf.cell(u, v);
         let (x, y, columns) = (cell.x, cell.y, self.vndf.columns);
         let vertex = |r: usize, c: usize| (cell.row + r) * columns + cell.column + c;
@@ -279,7 +337,8 @@ impl RglMeasurement {
         let along = |k| read(|d| &d.along, k);
         let left = mix(value(0, 0), value(1, 0));
         let right = mix(value(0, 1), value(1, 1));
-        let within = left * x + 0.5 * x * x * (right - left) + mix(along(vertex(0, 0)), along(vertex(1, 0)));
+        let within =
+            left * x + 0.5 * x * x * (right - left) + mix(along(vertex(0, 0)), along(vertex(1, 0)));
         let row = |r: usize| along((cell.row + r + 1) * columns - 1);
         let (lower, upper) = (row(0), row(1));
         let whole = mix(lower, upper);
@@ -299,7 +358,10 @@ impl MeasuredBrdf for RglMeasurement {
         let turn = half[1].atan2(half[0]) - wi[1].atan2(wi[0]);
         let mut sum = [0.0; 3];
         for (index, azimuth) in self.azimuths.iter().enumerate() {
-            for (s, v) in sum.iter_mut().zip(self.at(index, azimuth, theta_i, theta_m, turn)) {
+            for (s, v) in sum
+                .iter_mut()
+                .zip(self.at(index, azimuth, theta_i, theta_m, turn))
+            {
                 *s += azimuth.weight * v / wo[2];
             }
         }
@@ -308,17 +370,34 @@ impl MeasuredBrdf for RglMeasurement {
 }
 
 fn wrong(name: &'static str, shape: &[usize], accepted: &str) -> RglError {
-    RglError::Shape { name, shape: shape.to_vec(), accepted: accepted.to_owned() }
+    RglError::Shape {
+        name,
+        shape: shape.to_vec(),
+        accepted: accepted.to_owned(),
+    }
 }
 
 /// A field of finite numbers, `>= 0` where it is a density.
-fn finite<'f>(file: &'f Tensors<'_>, name: &'static str, density: bool) -> Result<(Vec<f32>, &'f [usize]), RglError> {
+fn finite<'f>(
+    file: &'f Tensors<'_>,
+    name: &'static str,
+    density: bool,
+) -> Result<(Vec<f32>, &'f [usize]), RglError> {
     let (values, shape) = file.floats(name)?;
-    let accepted = if density { "finite numbers from 0" } else { "finite numbers" };
+    let accepted = if density {
+        "finite numbers from 0"
+    } else {
+        "finite numbers"
+    };
     // f32 squared sums must stay finite: nothing a goniometer writes comes near 1e15.
     let good = |v: f32| v.abs() <= 1e15 && !(density && v < 0.0);
     match values.iter().position(|&v| !good(v)) {
-        Some(index) => Err(RglError::Value { name, index, value: values[index], accepted }),
+        Some(index) => Err(RglError::Value {
+            name,
+            index,
+            value: values[index],
+            accepted,
+        }),
         None => Ok((values, shape)),
     }
 }
@@ -332,11 +411,20 @@ fn angles(
 ) -> Result<Vec<f64>, RglError> {
     let (values, shape) = file.floats(name)?;
     if shape.len() != 1 || values.len() < least || values.len() > 4096 {
-        return Err(wrong(name, shape, &format!("one dimension of {least} to 4096")));
+        return Err(wrong(
+            name,
+            shape,
+            &format!("one dimension of {least} to 4096"),
+        ));
     }
     for (index, &value) in values.iter().enumerate() {
         if !range.contains(&value) || (index > 0 && value <= values[index - 1]) {
-            return Err(RglError::Angle { name, index, value, accepted });
+            return Err(RglError::Angle {
+                name,
+                index,
+                value,
+                accepted,
+            });
         }
     }
     Ok(values.into_iter().map(f64::from).collect())
@@ -352,12 +440,18 @@ fn surface(file: &Tensors<'_>, name: &'static str) -> Result<(Extent, Vec<f32>),
 
 /// Weights of an average over ascending nodes, trapezoidal: the two ends of a full turn are the same azimuth.
 fn trapezoid(nodes: &[f64]) -> Vec<f64> {
-    let (Some(first), Some(last)) = (nodes.first(), nodes.last()) else { return Vec::new() };
+    let (Some(first), Some(last)) = (nodes.first(), nodes.last()) else {
+        return Vec::new();
+    };
     if nodes.len() < 2 {
         return vec![1.0];
     }
     (0..nodes.len())
-        .map(|k| (nodes[(k + 1).min(nodes.len() - 1)] - nodes[k.saturating_sub(1)]) / 2.0 / (last - first))
+        .map(|k| {
+            (nodes[(k + 1).min(nodes.len() - 1)] - nodes[k.saturating_sub(1)])
+                / 2.0
+                / (last - first)
+        })
         .collect()
 }
 
@@ -370,9 +464,12 @@ mod tests {
     fn file(phi: &[f32], color: impl Fn(usize, usize) -> f32) -> Vec<u8> {
         let theta = [0.0, 0.8, 1.57];
         let n = phi.len();
-        let vndf: Vec<f32> =
-            (0..n * 3 * 16).map(|k| 1.0 + f32::from(u8::try_from(k * 7 % 5).expect("small"))).collect();
-        let colors: Vec<f32> = (0..n * 3 * 3 * 4).map(|k| color(k / 36, k / 4 % 3)).collect();
+        let vndf: Vec<f32> = (0..n * 3 * 16)
+            .map(|k| 1.0 + f32::from(u8::try_from(k * 7 % 5).expect("small")))
+            .collect();
+        let colors: Vec<f32> = (0..n * 3 * 3 * 4)
+            .map(|k| color(k / 36, k / 4 % 3))
+            .collect();
         let n = n as u64;
         tensor_file(&[
             ("theta_i", &[3], &theta),
@@ -386,7 +483,8 @@ mod tests {
 
     #[test]
     fn an_even_color_is_the_microfacet_formula_whatever_the_warp() {
-        let measured = RglMeasurement::read(&file(&[0.0], |_, c| [0.3, -0.2, 0.8][c])).expect("whole");
+        let measured =
+            RglMeasurement::read(&file(&[0.0], |_, c| [0.3, -0.2, 0.8][c])).expect("whole");
         let (wi, wo) = ([-0.5, 0.0, 0.75_f64.sqrt()], [0.5, 0.0, 0.75_f64.sqrt()]);
         // θi = 30°: σ at √(1/3) between 1 and 0.5; half vector along n, ndf 1.
         let sigma = 1.0 - 0.5 * (1.0_f64 / 3.0).sqrt();
@@ -402,11 +500,15 @@ mod tests {
     fn an_anisotropic_sample_is_averaged_over_azimuth() {
         let phi = [-3.0, -1.5, 0.0, 1.5, 3.0];
         let measured =
-            RglMeasurement::read(&file(&phi, |p, _| f32::from(u8::try_from(p).expect("few")))).expect("whole");
+            RglMeasurement::read(&file(&phi, |p, _| f32::from(u8::try_from(p).expect("few"))))
+                .expect("whole");
         let one = RglMeasurement::read(&file(&[0.0], |_, _| 1.0)).expect("whole");
         assert!(measured.is_anisotropic());
         let (wi, wo) = ([0.3, 0.1, 0.9_f64.sqrt()], [0.1, -0.3, 0.9_f64.sqrt()]);
-        let (got, unit) = (measured.reflectance(wi, wo).expect("above"), one.reflectance(wi, wo).expect("above"));
+        let (got, unit) = (
+            measured.reflectance(wi, wo).expect("above"),
+            one.reflectance(wi, wo).expect("above"),
+        );
         // Trapezoid over 0, 1, 2, 3, 4 is 2; ndf and sigma do not change with azimuth here.
         assert!((got[0] / unit[0] - 2.0).abs() < 1e-6, "{got:?} {unit:?}");
     }
@@ -422,7 +524,8 @@ mod tests {
         let at = |u: f64, v: f64| {
             let c = measured.vndf.cell(u, v);
             let d = |r: usize, k: usize| density.values[(c.row + r) * 4 + c.column + k];
-            (1.0 - c.y) * ((1.0 - c.x) * d(0, 0) + c.x * d(0, 1)) + c.y * ((1.0 - c.x) * d(1, 0) + c.x * d(1, 1))
+            (1.0 - c.y) * ((1.0 - c.x) * d(0, 0) + c.x * d(0, 1))
+                + c.y * ((1.0 - c.x) * d(1, 0) + c.x * d(1, 1))
         };
         let n = 600;
         let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(n);
@@ -435,7 +538,11 @@ mod tests {
 
     #[test]
     fn damage_is_named_by_field_and_value() {
-        let error = |bytes: &[u8]| RglMeasurement::read(bytes).expect_err("damaged").to_string();
+        let error = |bytes: &[u8]| {
+            RglMeasurement::read(bytes)
+                .expect_err("damaged")
+                .to_string()
+        };
         assert!(error(b"nothing").contains("tensor_file"));
         let good = file(&[0.0], |_, _| 1.0);
         assert!(error(&good[..good.len() - 1]).contains("rgb"));
@@ -448,7 +555,14 @@ mod tests {
     fn nothing_is_measured_below_the_horizon() {
         let measured = RglMeasurement::read(&file(&[0.0], |_, _| 1.0)).expect("whole");
         assert_eq!(measured.reflectance([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]), None);
-        assert_eq!(measured.reflectance([0.6, 0.0, -0.8], [0.0, 0.0, 1.0]), None);
-        assert!(measured.reflectance([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]).is_some());
+        assert_eq!(
+            measured.reflectance([0.6, 0.0, -0.8], [0.0, 0.0, 1.0]),
+            None
+        );
+        assert!(
+            measured
+                .reflectance([0.0, 0.0, 1.0], [0.0, 0.0, 1.0])
+                .is_some()
+        );
     }
 }

@@ -83,12 +83,20 @@ impl HalfAngleTable {
         }
         if values.len() != ENTRIES {
             let (wanted, bytes) = (12 * ENTRIES as u64, 12 * values.len());
-            return Err(TableError::Length { layout: "half-angle", wanted, bytes });
+            return Err(TableError::Length {
+                layout: "half-angle",
+                wanted,
+                bytes,
+            });
         }
         if invalid == ENTRIES {
             return Err(TableError::AllInvalid(ENTRIES));
         }
-        Ok(Self { spacing, values, invalid })
+        Ok(Self {
+            spacing,
+            values,
+            invalid,
+        })
     }
 
     /// Samples a reflectance on the middles of a table's bins; `None` marks an entry invalid.
@@ -102,7 +110,8 @@ impl HalfAngleTable {
     ) -> Result<Self, TableError> {
         let entries = (0..ENTRIES).map(|k| {
             let (wi, wo) = bin_middle(spacing, k);
-            #[allow(clippy::cast_possible_truncation)] // Entries are stored as the files store them.
+            #[allow(clippy::cast_possible_truncation)]
+            // Entries are stored as the files store them.
             reflectance(wi, wo).map(|rgb| rgb.map(|v| v as f32))
         });
         Self::new(spacing, entries)
@@ -156,7 +165,8 @@ fn neighbours(position: f64, count: usize) -> (usize, usize, f64) {
 fn neighbours_around(position: f64, count: usize) -> (usize, usize, f64) {
     let n = f64::from(u32::try_from(count).unwrap_or(u32::MAX));
     let x = (position - 0.5).rem_euclid(n);
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0..=count by the remainder.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    // 0..=count by the remainder.
     let low = x as usize % count;
     (low, (low + 1) % count, x - x.floor())
 }
@@ -170,7 +180,11 @@ impl MeasuredBrdf for HalfAngleTable {
         let sum = [wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]];
         // The half frame: z along h, x towards larger θh. With h along n the azimuth starts at the x axis.
         let across = sum[0].hypot(sum[1]);
-        let (c, s) = if across > 0.0 { (sum[0] / across, sum[1] / across) } else { (1.0, 0.0) };
+        let (c, s) = if across > 0.0 {
+            (sum[0] / across, sum[1] / across)
+        } else {
+            (1.0, 0.0)
+        };
         let (sh, ch) = angles.theta_h.sin_cos();
         let (x, y) = (c * wi[0] + s * wi[1], c * wi[1] - s * wi[0]);
         let phi = y.atan2(ch * x - sh * wi[2]).rem_euclid(PI);
@@ -226,12 +240,23 @@ mod tests {
         for spacing in [ThetaHSpacing::Linear, ThetaHSpacing::SquareRoot] {
             let table = HalfAngleTable::sample(spacing, smooth).expect("mostly valid");
             assert!(table.invalid_share() > 0.1 && table.invalid_share() < 0.9);
-            for (h, d, p) in [(0.0, 0.3, 1.0), (0.31, 0.42, 0.7), (0.6, 0.1, 3.0), (0.2, 0.9, 2.2)] {
+            for (h, d, p) in [
+                (0.0, 0.3, 1.0),
+                (0.31, 0.42, 0.7),
+                (0.6, 0.1, 3.0),
+                (0.2, 0.9, 2.2),
+            ] {
                 let (wi, wo) = half_frame_pair(h, d, p);
-                let (got, want) = (table.reflectance(wi, wo).expect("valid"), smooth(wi, wo).expect("valid"));
+                let (got, want) = (
+                    table.reflectance(wi, wo).expect("valid"),
+                    smooth(wi, wo).expect("valid"),
+                );
                 for (g, w) in got.iter().zip(want) {
                     // Half a square-root bin at 35° is 0.6°.
-                    assert!((g - w).abs() < 5e-3, "{spacing:?} {h} {d} {p}: {got:?} {want:?}");
+                    assert!(
+                        (g - w).abs() < 5e-3,
+                        "{spacing:?} {h} {d} {p}: {got:?} {want:?}"
+                    );
                 }
             }
         }
@@ -262,7 +287,8 @@ mod tests {
 
     #[test]
     fn a_table_without_a_valid_entry_is_refused() {
-        let error = HalfAngleTable::sample(ThetaHSpacing::Linear, |_, _| None).expect_err("nothing valid");
+        let error =
+            HalfAngleTable::sample(ThetaHSpacing::Linear, |_, _| None).expect_err("nothing valid");
         assert_eq!(error, TableError::AllInvalid(ENTRIES));
     }
 

@@ -47,7 +47,9 @@ pub enum TensorError {
         code: u8,
     },
     /// A field that does not lie within the file.
-    #[error("field {name} of shape {shape:?} at offset {offset} does not fit the file of {bytes} bytes")]
+    #[error(
+        "field {name} of shape {shape:?} at offset {offset} does not fit the file of {bytes} bytes"
+    )]
     Outside {
         /// Name of the field.
         name: String,
@@ -128,22 +130,35 @@ impl<'a> Tensors<'a> {
         if count > MAX_FIELDS {
             return Err(TensorError::Fields(count));
         }
-        let fields = (0..count).map(|k| field(&mut cursor, bytes, k)).collect::<Result<_, _>>()?;
+        let fields = (0..count)
+            .map(|k| field(&mut cursor, bytes, k))
+            .collect::<Result<_, _>>()?;
         Ok(Self { fields })
     }
 
     /// The field of a name.
     pub fn get(&self, name: &'static str) -> Result<&Field<'a>, TensorError> {
-        self.fields.iter().find(|f| f.name == name).ok_or(TensorError::Missing(name))
+        self.fields
+            .iter()
+            .find(|f| f.name == name)
+            .ok_or(TensorError::Missing(name))
     }
 
     /// The field of a name as `f32`.
     pub fn floats(&self, name: &'static str) -> Result<(Vec<f32>, &[usize]), TensorError> {
         let field = self.get(name)?;
         if field.code != 10 {
-            return Err(TensorError::WrongType { name, code: field.code, accepted: "10 (float32)" });
+            return Err(TensorError::WrongType {
+                name,
+                code: field.code,
+                accepted: "10 (float32)",
+            });
         }
-        let values = field.bytes.chunks_exact(4).filter_map(|c| c.try_into().ok().map(f32::from_le_bytes)).collect();
+        let values = field
+            .bytes
+            .chunks_exact(4)
+            .filter_map(|c| c.try_into().ok().map(f32::from_le_bytes))
+            .collect();
         Ok((values, &field.shape))
     }
 
@@ -153,33 +168,66 @@ impl<'a> Tensors<'a> {
     }
 }
 
-fn field<'a>(cursor: &mut Cursor<'a>, file: &'a [u8], index: u32) -> Result<Field<'a>, TensorError> {
+fn field<'a>(
+    cursor: &mut Cursor<'a>,
+    file: &'a [u8],
+    index: u32,
+) -> Result<Field<'a>, TensorError> {
     let cut = TensorError::Cut(index);
-    let Some(length) = cursor.take().map(u16::from_le_bytes) else { return Err(cut) };
-    let Some(name) = cursor.slice(length.into()) else { return Err(cut) };
+    let Some(length) = cursor.take().map(u16::from_le_bytes) else {
+        return Err(cut);
+    };
+    let Some(name) = cursor.slice(length.into()) else {
+        return Err(cut);
+    };
     let name: String = String::from_utf8_lossy(name).chars().take(80).collect();
-    let Some(dimensions) = cursor.take().map(u16::from_le_bytes) else { return Err(cut) };
+    let Some(dimensions) = cursor.take().map(u16::from_le_bytes) else {
+        return Err(cut);
+    };
     if dimensions > MAX_DIMENSIONS {
         return Err(TensorError::Dimensions { name, dimensions });
     }
-    let Some([code]) = cursor.take() else { return Err(cut) };
-    let Some(size) = size_of_code(code) else { return Err(TensorError::Type { name, code }) };
-    let Some(offset) = cursor.take().map(u64::from_le_bytes) else { return Err(cut) };
+    let Some([code]) = cursor.take() else {
+        return Err(cut);
+    };
+    let Some(size) = size_of_code(code) else {
+        return Err(TensorError::Type { name, code });
+    };
+    let Some(offset) = cursor.take().map(u64::from_le_bytes) else {
+        return Err(cut);
+    };
     let mut shape = Vec::new();
     for _ in 0..dimensions {
-        let Some(extent) = cursor.take().map(u64::from_le_bytes) else { return Err(cut) };
+        let Some(extent) = cursor.take().map(u64::from_le_bytes) else {
+            return Err(cut);
+        };
         shape.push(extent);
     }
     let place = || {
-        let extents: Vec<usize> = shape.iter().map(|&n| usize::try_from(n).ok()).collect::<Option<_>>()?;
-        let length = extents.iter().try_fold(size, |product, &n| product.checked_mul(n))?;
+        let extents: Vec<usize> = shape
+            .iter()
+            .map(|&n| usize::try_from(n).ok())
+            .collect::<Option<_>>()?;
+        let length = extents
+            .iter()
+            .try_fold(size, |product, &n| product.checked_mul(n))?;
         let start = usize::try_from(offset).ok()?;
         let data = file.get(start..start.checked_add(length)?)?;
         Some((extents, data))
     };
     match place() {
-        Some((extents, data)) => Ok(Field { name, code, shape: extents, bytes: data }),
-        None => Err(TensorError::Outside { name, shape, offset, bytes: file.len() }),
+        Some((extents, data)) => Ok(Field {
+            name,
+            code,
+            shape: extents,
+            bytes: data,
+        }),
+        None => Err(TensorError::Outside {
+            name,
+            shape,
+            offset,
+            bytes: file.len(),
+        }),
     }
 }
 
@@ -190,7 +238,10 @@ pub(super) mod tests {
 
     /// Writes a tensor file of these `f32` fields and one byte field.
     pub(in crate::measurement) fn tensor_file(fields: &[(&str, &[u64], &[f32])]) -> Vec<u8> {
-        let header: usize = fields.iter().map(|(name, shape, _)| 2 + name.len() + 2 + 1 + 8 + 8 * shape.len()).sum();
+        let header: usize = fields
+            .iter()
+            .map(|(name, shape, _)| 2 + name.len() + 2 + 1 + 8 + 8 * shape.len())
+            .sum();
         let mut file = MAGIC.to_vec();
         file.extend_from_slice(&[1, 0]);
         file.extend_from_slice(&u32::try_from(fields.len()).expect("few").to_le_bytes());
@@ -220,7 +271,10 @@ pub(super) mod tests {
         let tensors = Tensors::read(&file).expect("whole");
         assert_eq!(tensors.floats("b").expect("there").0, [4.0, 5.0, 6.0]);
         assert_eq!(tensors.floats("b").expect("there").1, [1, 3]);
-        assert!(matches!(tensors.floats("c"), Err(TensorError::Missing("c"))));
+        assert!(matches!(
+            tensors.floats("c"),
+            Err(TensorError::Missing("c"))
+        ));
     }
 
     #[test]
@@ -230,7 +284,10 @@ pub(super) mod tests {
         let at = 12 + 2 + 4 + 2 + 5 + 2 + 1 + 8;
         file[at..at + 8].copy_from_slice(&(1_u64 << 63).to_le_bytes());
         let error = Tensors::read(&file).expect_err("too large");
-        assert!(matches!(&error, TensorError::Outside { name, .. } if name == "sigma"), "{error}");
+        assert!(
+            matches!(&error, TensorError::Outside { name, .. } if name == "sigma"),
+            "{error}"
+        );
     }
 
     #[test]

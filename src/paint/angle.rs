@@ -62,7 +62,11 @@ impl AngleGrid {
                 return Err(AngleGridError::Range { index, value });
             }
             if index > 0 && value <= degrees[index - 1] {
-                return Err(AngleGridError::Order { index, value, before: degrees[index - 1] });
+                return Err(AngleGridError::Order {
+                    index,
+                    value,
+                    before: degrees[index - 1],
+                });
             }
         }
         Ok(Self { degrees })
@@ -92,14 +96,26 @@ impl AngleGrid {
     pub fn bracket(&self, angle_deg: f64) -> Bracket {
         let above = self.degrees.partition_point(|&d| d <= angle_deg);
         if above == 0 {
-            return Bracket { low: 0, high: 0, fraction: 0.0 };
+            return Bracket {
+                low: 0,
+                high: 0,
+                fraction: 0.0,
+            };
         }
         let low = above - 1;
         if above == self.degrees.len() {
-            return Bracket { low, high: low, fraction: 0.0 };
+            return Bracket {
+                low,
+                high: low,
+                fraction: 0.0,
+            };
         }
         let fraction = (angle_deg - self.degrees[low]) / (self.degrees[above] - self.degrees[low]);
-        Bracket { low, high: above, fraction }
+        Bracket {
+            low,
+            high: above,
+            fraction,
+        }
     }
 
     /// The angles of both grids, each once.
@@ -136,7 +152,10 @@ impl QuickGrid {
             let at = f32::from(half) / 2.0;
             degrees.partition_point(|&d| d <= at).saturating_sub(1) as u32
         });
-        Self { start: start.collect(), degrees }
+        Self {
+            start: start.collect(),
+            degrees,
+        }
     }
 
     pub(crate) const fn len(&self) -> usize {
@@ -153,10 +172,18 @@ impl QuickGrid {
             low += 1;
         }
         if low == last {
-            return QuickBracket { low, high: low, fraction: 0.0 };
+            return QuickBracket {
+                low,
+                high: low,
+                fraction: 0.0,
+            };
         }
         let (below, above) = (self.degrees[low], self.degrees[low + 1]);
-        QuickBracket { low, high: low + 1, fraction: ((angle_deg - below) / (above - below)).max(0.0) }
+        QuickBracket {
+            low,
+            high: low + 1,
+            fraction: ((angle_deg - below) / (above - below)).max(0.0),
+        }
     }
 }
 
@@ -180,14 +207,26 @@ mod tests {
     #[test]
     fn angles_that_do_not_ascend_are_refused_by_place_and_value() {
         let error = AngleGrid::new(vec![0.0, 5.0, 5.0]).expect_err("refused");
-        assert_eq!(error, AngleGridError::Order { index: 2, value: 5.0, before: 5.0 });
+        assert_eq!(
+            error,
+            AngleGridError::Order {
+                index: 2,
+                value: 5.0,
+                before: 5.0
+            }
+        );
         assert!(AngleGrid::new(vec![f64::NAN]).is_err());
         assert!(AngleGrid::new(vec![0.0, 90.1]).is_err());
     }
 
     #[test]
     fn the_quick_grid_finds_the_same_neighbours() {
-        for degrees in [vec![0.0], vec![10.0, 20.0], vec![0.0, 0.1, 0.2, 0.7, 33.3, 66.0], vec![90.0]] {
+        for degrees in [
+            vec![0.0],
+            vec![10.0, 20.0],
+            vec![0.0, 0.1, 0.2, 0.7, 33.3, 66.0],
+            vec![90.0],
+        ] {
             let grid = AngleGrid::new(degrees).expect("ascending");
             let quick = QuickGrid::new(&grid);
             for step in 0..1000_u16 {
@@ -198,7 +237,11 @@ mod tests {
                     let high = (low + 1).min(grid.len() - 1);
                     grid.degrees()[low] * (1.0 - fraction) + grid.degrees()[high] * fraction
                 };
-                assert!((at(want.low, want.fraction) - at(got.low, f64::from(got.fraction))).abs() < 1e-4, "{angle}");
+                assert!(
+                    (at(want.low, want.fraction) - at(got.low, f64::from(got.fraction))).abs()
+                        < 1e-4,
+                    "{angle}"
+                );
             }
         }
     }
@@ -206,9 +249,37 @@ mod tests {
     #[test]
     fn a_bracket_holds_the_border_outside_the_range() {
         let grid = AngleGrid::new(vec![10.0, 20.0]).expect("ascending");
-        assert_eq!(grid.bracket(5.0), Bracket { low: 0, high: 0, fraction: 0.0 });
-        assert_eq!(grid.bracket(12.5), Bracket { low: 0, high: 1, fraction: 0.25 });
-        assert_eq!(grid.bracket(20.0), Bracket { low: 1, high: 1, fraction: 0.0 });
-        assert_eq!(grid.bracket(80.0), Bracket { low: 1, high: 1, fraction: 0.0 });
+        assert_eq!(
+            grid.bracket(5.0),
+            Bracket {
+                low: 0,
+                high: 0,
+                fraction: 0.0
+            }
+        );
+        assert_eq!(
+            grid.bracket(12.5),
+            Bracket {
+                low: 0,
+                high: 1,
+                fraction: 0.25
+            }
+        );
+        assert_eq!(
+            grid.bracket(20.0),
+            Bracket {
+                low: 1,
+                high: 1,
+                fraction: 0.0
+            }
+        );
+        assert_eq!(
+            grid.bracket(80.0),
+            Bracket {
+                low: 1,
+                high: 1,
+                fraction: 0.0
+            }
+        );
     }
 }

@@ -21,8 +21,10 @@ const THIN: f64 = 2e-3;
 pub fn mean_color(lower: [f32; 3], upper: [f32; 3]) -> LinearRgb {
     let lo = lower.map(f64::from);
     let hi = upper.map(f64::from);
-    let (center, half): ([f64; 3], [f64; 3]) =
-        (std::array::from_fn(|k| f64::midpoint(lo[k], hi[k])), std::array::from_fn(|k| (hi[k] - lo[k]).abs() / 2.0));
+    let (center, half): ([f64; 3], [f64; 3]) = (
+        std::array::from_fn(|k| f64::midpoint(lo[k], hi[k])),
+        std::array::from_fn(|k| (hi[k] - lo[k]).abs() / 2.0),
+    );
     let (y, dy) = ((center[0] + 16.0) / 116.0, half[0] / 116.0);
     let (u, du) = (center[1] / 500.0, half[1] / 500.0);
     let (v, dv) = (center[2] / 200.0, half[2] / 200.0);
@@ -72,7 +74,11 @@ fn middle_of_mean(t: f64, ds: f64, dt: f64, near: f64) -> f64 {
             low = m;
         }
         let step = m - miss / slope;
-        let next = if step > low && step < high { step } else { f64::midpoint(low, high) };
+        let next = if step > low && step < high {
+            step
+        } else {
+            f64::midpoint(low, high)
+        };
         if next == m {
             break;
         }
@@ -101,7 +107,8 @@ fn mean_of_sum(m: f64, ds: f64, dt: f64) -> f64 {
     } else if narrow < THIN {
         gauss(m, narrow, |x| (p1(x + wide) - p1(x - wide)) / (2.0 * wide))
     } else {
-        (p2(m + reach) - p2(m + wide - narrow) - p2(m - wide + narrow) + p2(m - reach)) / (4.0 * wide * narrow)
+        (p2(m + reach) - p2(m + wide - narrow) - p2(m - wide + narrow) + p2(m - reach))
+            / (4.0 * wide * narrow)
     }
 }
 
@@ -111,12 +118,19 @@ fn gauss(m: f64, half: f64, f: impl Fn(f64) -> f64) -> f64 {
     if half == 0.0 {
         return f(m);
     }
-    NODE.iter().zip(WEIGHT).map(|(x, w)| w * f64::midpoint(f(m - half * x), f(m + half * x))).sum()
+    NODE.iter()
+        .zip(WEIGHT)
+        .map(|(x, w)| w * f64::midpoint(f(m - half * x), f(m + half * x)))
+        .sum()
 }
 
 fn p1(f: f64) -> f64 {
     let d = KNEE;
-    if f > d { f.powi(4) / 4.0 - 0.75 * d.powi(4) } else { 1.5 * d * d * f * f - 2.0 * d.powi(3) * f }
+    if f > d {
+        f.powi(4) / 4.0 - 0.75 * d.powi(4)
+    } else {
+        1.5 * d * d * f * f - 2.0 * d.powi(3) * f
+    }
 }
 
 fn p2(f: f64) -> f64 {
@@ -138,12 +152,18 @@ mod tests {
     fn by_sums(lower: [f32; 3], upper: [f32; 3], n: u32) -> LinearRgb {
         let mut sum = [0.0; 3];
         let at = |k: usize, s: u32| {
-            f64::from(lower[k]) + (f64::from(upper[k]) - f64::from(lower[k])) * (f64::from(s) + 0.5) / f64::from(n)
+            f64::from(lower[k])
+                + (f64::from(upper[k]) - f64::from(lower[k])) * (f64::from(s) + 0.5) / f64::from(n)
         };
         for x in 0..n {
             for y in 0..n {
                 for z in 0..n {
-                    let rgb = Lab { l: at(0, x), a: at(1, y), b: at(2, z) }.to_rgb();
+                    let rgb = Lab {
+                        l: at(0, x),
+                        a: at(1, y),
+                        b: at(2, z),
+                    }
+                    .to_rgb();
                     for k in 0..3 {
                         sum[k] += rgb[k];
                     }

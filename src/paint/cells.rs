@@ -31,7 +31,12 @@ impl RandomTexture {
     /// The tile of these flakes: the one that pictures draw and bundles carry.
     #[must_use]
     pub fn of(texture: &FlakeTexture) -> Self {
-        Self::new(Self::TILE, Self::TILE, cell_spacing(texture.grain_um / texture.texel_um), 1)
+        Self::new(
+            Self::TILE,
+            Self::TILE,
+            cell_spacing(texture.grain_um / texture.texel_um),
+            1,
+        )
     }
 
     /// A tile of `width x height` texels whose cells are `spacing` texels apart (see [`cell_spacing`]).
@@ -47,7 +52,11 @@ impl RandomTexture {
             nearest_points(width, height, spacing, seed)
         };
         deal_numbers(&mut cells, seed);
-        Self { width, height, cells }
+        Self {
+            width,
+            height,
+            cells,
+        }
     }
 
     /// Texels across.
@@ -78,7 +87,10 @@ impl RandomTexture {
         if (tile_x, tile_y) == (0, 0) {
             return cell;
         }
-        mix(cell ^ mix(tile_x.cast_unsigned().wrapping_add(mix(tile_y.cast_unsigned()))))
+        mix(cell
+            ^ mix(tile_x
+                .cast_unsigned()
+                .wrapping_add(mix(tile_y.cast_unsigned()))))
     }
 }
 
@@ -99,10 +111,23 @@ struct Buckets {
 impl Buckets {
     fn new(width: u32, height: u32, spacing: f64, seed: u32) -> Self {
         // A bucket holds four cells: it is two spacings wide.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to 1..=4 per texel
-        let count = |size: u32| (f64::from(size) / (2.0 * spacing)).round().clamp(1.0, 4.0 * f64::from(size)) as u32;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // clamped to 1..=4 per texel
+        let count = |size: u32| {
+            (f64::from(size) / (2.0 * spacing))
+                .round()
+                .clamp(1.0, 4.0 * f64::from(size)) as u32
+        };
         let (columns, rows) = (count(width), count(height));
-        Self { columns, rows, step: [f64::from(width) / f64::from(columns), f64::from(height) / f64::from(rows)], seed }
+        Self {
+            columns,
+            rows,
+            step: [
+                f64::from(width) / f64::from(columns),
+                f64::from(height) / f64::from(rows),
+            ],
+            seed,
+        }
     }
 
     /// Points of a row of buckets and of one bucket more at either end, in order of columns from -1.
@@ -110,8 +135,10 @@ impl Buckets {
         let columns = i64::from(self.columns);
         let mut points = Vec::with_capacity((self.columns as usize + 2) * PER_BUCKET as usize);
         for column in -1..=columns {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below 2^30: at most 16 per texel
-            let bucket = (row.rem_euclid(i64::from(self.rows)) * columns + column.rem_euclid(columns)) as u32;
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            // below 2^30: at most 16 per texel
+            let bucket = (row.rem_euclid(i64::from(self.rows)) * columns
+                + column.rem_euclid(columns)) as u32;
             for k in 0..PER_BUCKET {
                 let index = bucket.wrapping_mul(PER_BUCKET).wrapping_add(k);
                 let hash = mix(index ^ mix(self.seed));
@@ -143,9 +170,12 @@ fn nearest_points(width: u32, height: u32, spacing: f64, seed: u32) -> Vec<u32> 
         }
         for x in 0..width {
             let px = f64::from(x) + 0.5;
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a bucket's index, not negative
-            let first =
-                (px / buckets.step[0]).floor().min(f64::from(buckets.columns - 1)) as usize * PER_BUCKET as usize;
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            // a bucket's index, not negative
+            let first = (px / buckets.step[0])
+                .floor()
+                .min(f64::from(buckets.columns - 1)) as usize
+                * PER_BUCKET as usize;
             let (mut distance, mut index) = (f64::INFINITY, 0);
             for (_, points) in &rows {
                 for &(qx, qy, candidate) in &points[first..first + 3 * PER_BUCKET as usize] {
@@ -170,8 +200,10 @@ fn deal_numbers(cells: &mut [u32], seed: u32) {
     }
     let order = mix(seed ^ 0xa511_e9b3);
     #[allow(clippy::cast_possible_truncation)] // indices are 32 bit
-    let mut dealt: Vec<(u32, u32)> =
-        (0..points as u32).filter(|k| area[*k as usize] > 0).map(|k| (mix(k ^ order), k)).collect();
+    let mut dealt: Vec<(u32, u32)> = (0..points as u32)
+        .filter(|k| area[*k as usize] > 0)
+        .map(|k| (mix(k ^ order), k))
+        .collect();
     dealt.sort_unstable();
     let (whole, mut before) = (cells.len() as u64, 0_u64);
     for (place, (_, index)) in (0_u32..).zip(dealt) {
@@ -242,8 +274,9 @@ mod tests {
                 let (w, h) = (tile.width(), tile.height());
                 let at = |x: u32, y: u32| tile.cells()[(y % h * w + x % w) as usize];
                 let texels = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
-                let same =
-                    texels.map(|(x, y)| u32::from(at(x, y) == at(x + lag, y)) + u32::from(at(x, y) == at(x, y + lag)));
+                let same = texels.map(|(x, y)| {
+                    u32::from(at(x, y) == at(x + lag, y)) + u32::from(at(x, y) == at(x, y + lag))
+                });
                 share += f64::from(same.sum::<u32>()) / f64::from(2 * w * h);
             }
             share / tiles.len() as f64
@@ -262,10 +295,15 @@ mod tests {
     #[test]
     fn tiles_have_the_grain_they_were_asked_for() {
         for grain in [0.5, 0.52, 0.57, 0.66, 0.75, 0.9, 1.2, 1.5, 2.0, 4.0, 9.0] {
-            let tiles: Vec<_> = (0..3).map(|seed| RandomTexture::new(240, 240, cell_spacing(grain), seed)).collect();
+            let tiles: Vec<_> = (0..3)
+                .map(|seed| RandomTexture::new(240, 240, cell_spacing(grain), seed))
+                .collect();
             let found = grain_of(&tiles);
             // 3 · 240² / spacing² cells, at least 380, whose sizes scatter by half: a standard error under 3 %.
-            assert!((found / grain - 1.0).abs() < 0.06, "{found} instead of {grain}");
+            assert!(
+                (found / grain - 1.0).abs() < 0.06,
+                "{found} instead of {grain}"
+            );
         }
     }
 
@@ -278,14 +316,19 @@ mod tests {
             for (rank, number) in numbers.iter().enumerate() {
                 let (share, place) = (rank as f64 / 20_000.0, f64::from(*number) / 4_294_967_296.0);
                 // Off by the rest of the cell itself; the largest is several times the mean of spacing² texels.
-                assert!((share - place).abs() <= 8.0 * spacing * spacing / 20_000.0, "{spacing}: {share} {place}");
+                assert!(
+                    (share - place).abs() <= 8.0 * spacing * spacing / 20_000.0,
+                    "{spacing}: {share} {place}"
+                );
             }
         }
     }
 
     #[test]
     fn spacing_grows_with_grain() {
-        let spacings: Vec<f64> = (0..2000).map(|k| cell_spacing(f64::from(k) * 0.005)).collect();
+        let spacings: Vec<f64> = (0..2000)
+            .map(|k| cell_spacing(f64::from(k) * 0.005))
+            .collect();
         assert!(spacings.windows(2).all(|w| w[0] <= w[1]));
     }
 
@@ -302,21 +345,33 @@ mod tests {
         };
         let inside = (0..127).map(|x| across(x).count()).sum::<usize>() as f64 / 127.0;
         // About 42 cells meet a line, in or out: a standard deviation near √128 · 0.5.
-        assert!((across(127).count() as f64 - inside).abs() < 24.0, "{} against {inside}", across(127).count());
+        assert!(
+            (across(127).count() as f64 - inside).abs() < 24.0,
+            "{} against {inside}",
+            across(127).count()
+        );
     }
 
     #[test]
     fn repetitions_of_a_tile_show_other_flakes() {
         let tile = RandomTexture::new(16, 16, 2.0, 1);
         assert_eq!(tile.at(3, 5), tile.cells()[5 * 16 + 3]);
-        let same = (0..16).filter(|k| tile.at(*k, 5) == tile.at(*k + 16, 5)).count();
+        let same = (0..16)
+            .filter(|k| tile.at(*k, 5) == tile.at(*k + 16, 5))
+            .count();
         assert_eq!(same, 0);
         assert_eq!(tile.at(-13, 5), tile.at(-13, 5));
     }
 
     #[test]
     fn tiny_tiles_and_huge_cells_are_tiles() {
-        for (width, height, spacing) in [(1, 1, 0.5), (1, 7, 100.0), (5, 1, 1.0), (0, 0, 3.0), (3, 3, 1e6)] {
+        for (width, height, spacing) in [
+            (1, 1, 0.5),
+            (1, 7, 100.0),
+            (5, 1, 1.0),
+            (0, 0, 3.0),
+            (3, 3, 1e6),
+        ] {
             let tile = RandomTexture::new(width, height, spacing, 0);
             assert_eq!(tile.cells().len(), (width.max(1) * height.max(1)) as usize);
         }

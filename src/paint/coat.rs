@@ -32,7 +32,11 @@ impl Coat {
     /// A smooth coat.
     #[must_use]
     pub const fn smooth(ior: f64) -> Self {
-        Self { ior, roughness: 0.0, thickness_um: None }
+        Self {
+            ior,
+            roughness: 0.0,
+            thickness_um: None,
+        }
     }
 
     /// Whether the highlight is a mirror image.
@@ -56,7 +60,11 @@ impl Coat {
     /// Weight of the mirror image seen at outer cosine `cos`, 0 where the highlight has finite width.
     #[must_use]
     pub fn mirror(&self, cos: f64) -> f64 {
-        if self.is_mirror() { fresnel(cos, self.ior) } else { 0.0 }
+        if self.is_mirror() {
+            fresnel(cos, self.ior)
+        } else {
+            0.0
+        }
     }
 }
 
@@ -110,7 +118,11 @@ mod tests {
 
     #[test]
     fn a_narrow_highlight_reflects_what_fresnel_says() {
-        let coat = Coat { ior: 1.5, roughness: 0.02, thickness_um: None };
+        let coat = Coat {
+            ior: 1.5,
+            roughness: 0.02,
+            thickness_um: None,
+        };
         let theta = 30.0_f64.to_radians();
         let wi = [-theta.sin(), 0.0, theta.cos()];
         let (n, reach) = (800_u32, 0.2);
@@ -125,7 +137,10 @@ mod tests {
             }
         }
         let smooth = fresnel(theta.cos(), 1.5);
-        assert!((albedo / smooth - 1.0).abs() < 5e-3, "{albedo} instead of {smooth}");
+        assert!(
+            (albedo / smooth - 1.0).abs() < 5e-3,
+            "{albedo} instead of {smooth}"
+        );
     }
 
     proptest! {

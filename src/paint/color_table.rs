@@ -48,26 +48,52 @@ impl ColorTable {
     /// # Errors
     ///
     /// [`ColorTableError`] when the counts differ or a color is not finite.
-    pub fn new(theta_h: AngleGrid, theta_d: AngleGrid, nodes: Vec<Lab>, overall: Lab) -> Result<Self, ColorTableError> {
+    pub fn new(
+        theta_h: AngleGrid,
+        theta_d: AngleGrid,
+        nodes: Vec<Lab>,
+        overall: Lab,
+    ) -> Result<Self, ColorTableError> {
         if nodes.len() != theta_h.len() * theta_d.len() {
             let (theta_h, theta_d) = (theta_h.len(), theta_d.len());
-            return Err(ColorTableError::Size { theta_h, theta_d, nodes: nodes.len() });
+            return Err(ColorTableError::Size {
+                theta_h,
+                theta_d,
+                nodes: nodes.len(),
+            });
         }
         let finite = |lab: &Lab| lab.to_array().iter().all(|v| v.is_finite());
         if let Some(k) = nodes.iter().position(|lab| !finite(lab)) {
-            return Err(ColorTableError::NotFinite { row: k / theta_d.len(), column: k % theta_d.len() });
+            return Err(ColorTableError::NotFinite {
+                row: k / theta_d.len(),
+                column: k % theta_d.len(),
+            });
         }
         if !finite(&overall) {
             return Err(ColorTableError::NotFinite { row: 0, column: 0 });
         }
-        Ok(Self { theta_h, theta_d, nodes, overall })
+        Ok(Self {
+            theta_h,
+            theta_d,
+            nodes,
+            overall,
+        })
     }
 
     /// A table that leaves every color as it is.
     #[must_use]
     pub fn white() -> Self {
-        let white = Lab { l: 100.0, a: 0.0, b: 0.0 };
-        Self { theta_h: AngleGrid::single(), theta_d: AngleGrid::single(), nodes: vec![white], overall: white }
+        let white = Lab {
+            l: 100.0,
+            a: 0.0,
+            b: 0.0,
+        };
+        Self {
+            theta_h: AngleGrid::single(),
+            theta_d: AngleGrid::single(),
+            nodes: vec![white],
+            overall: white,
+        }
     }
 
     /// Angles of the rows.
@@ -111,7 +137,12 @@ impl ColorTable {
                 });
             }
         }
-        Self { theta_h: theta_h.clone(), theta_d: theta_d.clone(), nodes, overall: self.overall }
+        Self {
+            theta_h: theta_h.clone(),
+            theta_d: theta_d.clone(),
+            nodes,
+            overall: self.overall,
+        }
     }
 }
 
@@ -126,7 +157,12 @@ fn on_node(bracket: Bracket) -> Option<usize> {
 ///
 /// When the table has not one color per angle pair.
 #[must_use]
-pub fn at_angles(table: &[LinearRgb], theta_h: &AngleGrid, theta_d: &AngleGrid, half: &HalfAngles) -> LinearRgb {
+pub fn at_angles(
+    table: &[LinearRgb],
+    theta_h: &AngleGrid,
+    theta_d: &AngleGrid,
+    half: &HalfAngles,
+) -> LinearRgb {
     let row = theta_h.bracket(half.theta_h.to_degrees());
     let column = theta_d.bracket(half.theta_d.to_degrees());
     bilinear(table, theta_d.len(), row, column)
@@ -136,8 +172,12 @@ pub fn at_angles(table: &[LinearRgb], theta_h: &AngleGrid, theta_d: &AngleGrid, 
 fn bilinear(table: &[LinearRgb], columns: usize, row: Bracket, column: Bracket) -> LinearRgb {
     let at = |r: usize, c: usize| table[r * columns + c];
     let (u, v) = (row.fraction, column.fraction);
-    let corners =
-        [at(row.low, column.low), at(row.low, column.high), at(row.high, column.low), at(row.high, column.high)];
+    let corners = [
+        at(row.low, column.low),
+        at(row.low, column.high),
+        at(row.high, column.low),
+        at(row.high, column.high),
+    ];
     let weights = [(1.0 - u) * (1.0 - v), (1.0 - u) * v, u * (1.0 - v), u * v];
     std::array::from_fn(|k| corners.iter().zip(weights).map(|(c, w)| c[k] * w).sum())
 }
@@ -149,12 +189,32 @@ mod tests {
     #[test]
     fn a_finer_grid_is_the_same_function() {
         let grid = |d: &[f64]| AngleGrid::new(d.to_vec()).expect("ascending");
-        let nodes: Vec<Lab> = (0..6).map(|k| Lab { l: 20.0 + 10.0 * f64::from(k), a: 5.0, b: -7.0 }).collect();
-        let table = ColorTable::new(grid(&[0.0, 30.0, 60.0]), grid(&[0.0, 50.0]), nodes, Lab::default()).expect("fits");
-        let finer = table.on(&grid(&[0.0, 10.0, 30.0, 60.0, 70.0]), &grid(&[0.0, 20.0, 50.0]));
+        let nodes: Vec<Lab> = (0..6)
+            .map(|k| Lab {
+                l: 20.0 + 10.0 * f64::from(k),
+                a: 5.0,
+                b: -7.0,
+            })
+            .collect();
+        let table = ColorTable::new(
+            grid(&[0.0, 30.0, 60.0]),
+            grid(&[0.0, 50.0]),
+            nodes,
+            Lab::default(),
+        )
+        .expect("fits");
+        let finer = table.on(
+            &grid(&[0.0, 10.0, 30.0, 60.0, 70.0]),
+            &grid(&[0.0, 20.0, 50.0]),
+        );
         let read = |t: &ColorTable, h: f64, d: f64| {
             let rgb: Vec<LinearRgb> = t.nodes().iter().map(|lab| lab.to_rgb()).collect();
-            bilinear(&rgb, t.theta_d().len(), t.theta_h().bracket(h), t.theta_d().bracket(d))
+            bilinear(
+                &rgb,
+                t.theta_d().len(),
+                t.theta_h().bracket(h),
+                t.theta_d().bracket(d),
+            )
         };
         for (h, d) in [(0.0, 0.0), (7.0, 33.0), (45.0, 12.0), (80.0, 60.0)] {
             for (x, y) in read(&table, h, d).iter().zip(read(&finer, h, d)) {

@@ -22,7 +22,9 @@ pub enum ContainerError {
     #[error("not a .{0} file: it does not begin as one")]
     Kind(&'static str),
     /// Written by a later carpaint.
-    #[error("this .{kind} file is version {found}, this carpaint reads up to version {known}: update carpaint")]
+    #[error(
+        "this .{kind} file is version {found}, this carpaint reads up to version {known}: update carpaint"
+    )]
     Newer {
         /// `paint` or `blend`.
         kind: &'static str,
@@ -77,7 +79,8 @@ pub struct Reader<'a> {
 impl Writer {
     /// Appends an array.
     pub fn array<T: Pod>(&mut self, values: &[T]) {
-        self.body.extend_from_slice(&(values.len() as u64).to_le_bytes());
+        self.body
+            .extend_from_slice(&(values.len() as u64).to_le_bytes());
         self.body.extend_from_slice(bytemuck::cast_slice(values));
     }
 
@@ -155,13 +158,20 @@ impl<'a> Container<'a> {
     ///
     /// [`ContainerError::Header`] when it does not hold a `T`.
     pub fn header<T: DeserializeOwned>(&self) -> Result<T, ContainerError> {
-        serde_json::from_slice(self.header).map_err(|source| ContainerError::Header { kind: self.kind, source })
+        serde_json::from_slice(self.header).map_err(|source| ContainerError::Header {
+            kind: self.kind,
+            source,
+        })
     }
 
     /// The arrays.
     #[must_use]
     pub const fn reader(&self) -> Reader<'a> {
-        Reader { kind: self.kind, rest: self.body, index: 0 }
+        Reader {
+            kind: self.kind,
+            rest: self.body,
+            index: 0,
+        }
     }
 }
 
@@ -178,10 +188,19 @@ impl Reader<'_> {
     ///
     /// [`ContainerError::Array`] when the body ends before it.
     pub fn array<T: Pod + Zeroable>(&mut self) -> Result<Vec<T>, ContainerError> {
-        let cut = ContainerError::Array { kind: self.kind, index: self.index };
-        let Some((count, rest)) = self.rest.split_first_chunk::<8>() else { return Err(cut) };
-        let bytes = usize::try_from(u64::from_le_bytes(*count)).ok().and_then(|n| n.checked_mul(size_of::<T>()));
-        let Some((values, rest)) = bytes.and_then(|n| rest.split_at_checked(n)) else { return Err(cut) };
+        let cut = ContainerError::Array {
+            kind: self.kind,
+            index: self.index,
+        };
+        let Some((count, rest)) = self.rest.split_first_chunk::<8>() else {
+            return Err(cut);
+        };
+        let bytes = usize::try_from(u64::from_le_bytes(*count))
+            .ok()
+            .and_then(|n| n.checked_mul(size_of::<T>()));
+        let Some((values, rest)) = bytes.and_then(|n| rest.split_at_checked(n)) else {
+            return Err(cut);
+        };
         self.rest = rest;
         self.index += 1;
         Ok(bytemuck::pod_collect_to_vec(values))
@@ -203,7 +222,10 @@ mod tests {
     fn what_was_written_is_read_again() {
         let bytes = file();
         let container = Container::open(&bytes, "paint", 3).expect("whole");
-        assert_eq!(container.header::<serde_json::Value>().expect("JSON")["name"], "silver");
+        assert_eq!(
+            container.header::<serde_json::Value>().expect("JSON")["name"],
+            "silver"
+        );
         let mut reader = container.reader();
         assert_eq!(reader.array::<f64>().expect("first"), [1.5, -2.0]);
         assert_eq!(reader.array::<[u32; 2]>().expect("second"), [[1, 2]]);
@@ -212,16 +234,27 @@ mod tests {
 
     #[test]
     fn a_newer_version_is_refused_by_number() {
-        let error = Container::open(&file(), "paint", 2).expect_err("newer").to_string();
-        assert!(error.contains("version 3") && error.contains("version 2"), "{error}");
-        assert!(matches!(Container::open(&file(), "blend", 3), Err(ContainerError::Kind("blend"))));
+        let error = Container::open(&file(), "paint", 2)
+            .expect_err("newer")
+            .to_string();
+        assert!(
+            error.contains("version 3") && error.contains("version 2"),
+            "{error}"
+        );
+        assert!(matches!(
+            Container::open(&file(), "blend", 3),
+            Err(ContainerError::Kind("blend"))
+        ));
     }
 
     #[test]
     fn every_cut_and_every_changed_byte_is_noticed() {
         let bytes = file();
         for length in 0..bytes.len() {
-            assert!(Container::open(&bytes[..length], "paint", 3).is_err(), "cut at {length}");
+            assert!(
+                Container::open(&bytes[..length], "paint", 3).is_err(),
+                "cut at {length}"
+            );
         }
         for k in 0..bytes.len() {
             let mut changed = bytes.clone();

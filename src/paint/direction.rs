@@ -37,7 +37,11 @@ pub fn half_angles(wi: Direction, wo: Direction) -> HalfAngles {
     let sum = [wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]];
     let difference = [wi[0] - wo[0], wi[1] - wo[1], wi[2] - wo[2]];
     let length = dot(sum, sum).sqrt();
-    let h = if length > 0.0 { sum.map(|v| v / length) } else { [0.0, 0.0, 1.0] };
+    let h = if length > 0.0 {
+        sum.map(|v| v / length)
+    } else {
+        [0.0, 0.0, 1.0]
+    };
     let across = h[0].hypot(h[1]);
     // |i+o| = 2 cos θd and |i−o| = 2 sin θd for unit vectors: exact at both ends.
     let (sine2, cosine2) = (dot(difference, difference).sqrt(), length);
@@ -55,7 +59,9 @@ pub fn half_angles(wi: Direction, wo: Direction) -> HalfAngles {
 ///
 /// Reflectance grows without bound towards the grazing mirror; above 1e150 the value stops, short of overflow.
 pub(crate) fn masking(h: &HalfAngles, i_z: f64, o_z: f64) -> f64 {
-    (1.0 / (i_z * o_z)).min(2.0 * h.h_z / (h.h_o * i_z.max(o_z))).min(1e150)
+    (1.0 / (i_z * o_z))
+        .min(2.0 * h.h_z / (h.h_o * i_z.max(o_z)))
+        .min(1e150)
 }
 
 /// Light and view directions of the six-angle instrument: light at 45° in air, viewer in the plane of incidence.
@@ -63,7 +69,10 @@ pub(crate) fn masking(h: &HalfAngles, i_z: f64, o_z: f64) -> f64 {
 pub fn instrument_pairs() -> [(Direction, Direction); 6] {
     ASPECULAR_DEG.map(|aspecular| {
         let (light, view) = (45.0_f64.to_radians(), (45.0 - aspecular).to_radians());
-        ([-light.sin(), 0.0, light.cos()], [view.sin(), 0.0, view.cos()])
+        (
+            [-light.sin(), 0.0, light.cos()],
+            [view.sin(), 0.0, view.cos()],
+        )
     })
 }
 
@@ -79,8 +88,14 @@ mod tests {
         let theta_d = [31.69, 23.80, 20.65, 14.06, 4.33, 4.52];
         for (k, (wi, wo)) in instrument_pairs().into_iter().enumerate() {
             let angles = half_angles(refract(wi, 1.5), refract(wo, 1.5));
-            assert!((angles.theta_h.to_degrees() - theta_h[k]).abs() < 0.006, "{k}");
-            assert!((angles.theta_d.to_degrees() - theta_d[k]).abs() < 0.006, "{k}");
+            assert!(
+                (angles.theta_h.to_degrees() - theta_h[k]).abs() < 0.006,
+                "{k}"
+            );
+            assert!(
+                (angles.theta_d.to_degrees() - theta_d[k]).abs() < 0.006,
+                "{k}"
+            );
         }
     }
 

@@ -32,9 +32,16 @@ const INCIDENCE_DEG: [f64; 6] = [0.0, 30.0, 50.0, 65.0, 80.0, 89.0];
 #[must_use]
 pub fn certify(paint: &CarPaint) -> EnergyCertificate {
     let reflectance = Reflectance::new(paint);
-    let albedo: Vec<f64> = INCIDENCE_DEG.iter().map(|&theta| directional_albedo(&reflectance, theta)).collect();
+    let albedo: Vec<f64> = INCIDENCE_DEG
+        .iter()
+        .map(|&theta| directional_albedo(&reflectance, theta))
+        .collect();
     let conserves = albedo.iter().all(|&a| a <= 1.001);
-    EnergyCertificate { incidence_deg: INCIDENCE_DEG.to_vec(), albedo, conserves }
+    EnergyCertificate {
+        incidence_deg: INCIDENCE_DEG.to_vec(),
+        albedo,
+        conserves,
+    }
 }
 
 /// Half vectors of Beckmann density around the normal, one batch a roughness: `dω_o = 4 (h·o) dω_h`.
@@ -48,7 +55,13 @@ fn directional_albedo(reflectance: &Reflectance<'_>, theta_deg: f64) -> f64 {
         .iter()
         .filter(|lobe| !lobe.is_absent())
         .map(|lobe| lobe.alpha)
-        .chain(paint.coat.iter().filter(|coat| !coat.is_mirror()).map(|coat| coat.roughness))
+        .chain(
+            paint
+                .coat
+                .iter()
+                .filter(|coat| !coat.is_mirror())
+                .map(|coat| coat.roughness),
+        )
         .fold(0.5, f64::min)
         .max(1e-4);
     let theta = theta_deg.to_radians();
@@ -65,7 +78,11 @@ fn directional_albedo(reflectance: &Reflectance<'_>, theta_deg: f64) -> f64 {
         let solid = tangent * width * cos_h.powi(3) * TAU / f64::from(spokes);
         for spoke in 0..spokes {
             let phi = (f64::from(spoke) + 0.5) / f64::from(spokes) * TAU;
-            let h = [tangent * cos_h * phi.cos(), tangent * cos_h * phi.sin(), cos_h];
+            let h = [
+                tangent * cos_h * phi.cos(),
+                tangent * cos_h * phi.sin(),
+                cos_h,
+            ];
             let h_i = h[0] * wi[0] + h[2] * wi[2];
             let wo: [f64; 3] = std::array::from_fn(|k| 2.0 * h_i * h[k] - wi[k]);
             if h_i <= 0.0 || wo[2] <= 0.0 {
@@ -86,8 +103,18 @@ mod tests {
     use crate::paint::{Coat, ColorTable, Lobe};
 
     fn one_lobe(alpha: f64, coat: Option<Coat>) -> CarPaint {
-        let lobes = vec![Lobe { weight: [1.0; 3], alpha, f0: 1.0 }];
-        CarPaint { coat, diffuse: [0.0; 3], lobes, color_table: ColorTable::white(), flakes: None }
+        let lobes = vec![Lobe {
+            weight: [1.0; 3],
+            alpha,
+            f0: 1.0,
+        }];
+        CarPaint {
+            coat,
+            diffuse: [0.0; 3],
+            lobes,
+            color_table: ColorTable::white(),
+            flakes: None,
+        }
     }
 
     /// Model description, section 1: ρ = 4.0 for α = 0.1 and 3.57 for 0.5 at normal incidence, s = F0 = 1.
@@ -109,7 +136,11 @@ mod tests {
 
     #[test]
     fn a_white_furnace_of_a_diffuse_paint_keeps_its_albedo() {
-        let paint = CarPaint { diffuse: [0.8; 3], lobes: Vec::new(), ..one_lobe(0.1, None) };
+        let paint = CarPaint {
+            diffuse: [0.8; 3],
+            lobes: Vec::new(),
+            ..one_lobe(0.1, None)
+        };
         for albedo in certify(&paint).albedo {
             assert!((albedo - 0.8).abs() < 2e-3, "{albedo}");
         }

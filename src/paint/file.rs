@@ -4,7 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::container::{Container, ContainerError, Writer};
 use super::energy::EnergyCertificate;
-use super::{AngleGrid, CarPaint, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes, Limits, Lobe, PaintError};
+use super::{
+    AngleGrid, CarPaint, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes, Limits, Lobe,
+    PaintError,
+};
 use crate::color::{Lab, LinearRgb};
 
 /// Latest version of the file that is read and the one that is written.
@@ -120,7 +123,12 @@ impl PhysicalHeader {
 }
 
 fn write_arrays(paint: &CarPaint, writer: &mut Writer) {
-    let nodes: Vec<[f64; 3]> = paint.color_table.nodes().iter().map(|lab| lab.to_array()).collect();
+    let nodes: Vec<[f64; 3]> = paint
+        .color_table
+        .nodes()
+        .iter()
+        .map(|lab| lab.to_array())
+        .collect();
     writer.array(&nodes);
     if let Some(flakes) = &paint.flakes {
         writer.array(&flakes.offsets);
@@ -142,7 +150,8 @@ impl CarPaint {
         write_arrays(self, &mut writer);
         let mut hasher = blake3::Hasher::new();
         hasher.update(&VERSION.to_le_bytes());
-        hasher.update(&serde_json::to_vec(&PhysicalHeader::of(self)).expect("plain data serialises"));
+        hasher
+            .update(&serde_json::to_vec(&PhysicalHeader::of(self)).expect("plain data serialises"));
         hasher.update(writer.body());
         hasher.finalize()
     }
@@ -182,10 +191,18 @@ impl PaintFile {
         let header: Header = container.header()?;
         let mut reader = container.reader();
         let physical = header.physical;
-        let nodes = reader.array::<[f64; 3]>()?.into_iter().map(Lab::from).collect();
-        let color_table =
-            ColorTable::new(physical.chi_theta_h_deg, physical.chi_theta_d_deg, nodes, physical.chi_overall)
-                .map_err(PaintError::from)?;
+        let nodes = reader
+            .array::<[f64; 3]>()?
+            .into_iter()
+            .map(Lab::from)
+            .collect();
+        let color_table = ColorTable::new(
+            physical.chi_theta_h_deg,
+            physical.chi_theta_d_deg,
+            nodes,
+            physical.chi_overall,
+        )
+        .map_err(PaintError::from)?;
         let flakes = match physical.flakes {
             None => None,
             Some(flakes) => Some(Flakes {
@@ -199,7 +216,13 @@ impl PaintFile {
             }),
         };
         let (coat, diffuse, lobes) = (physical.coat, physical.diffuse, physical.lobes);
-        let paint = CarPaint { coat, diffuse, lobes, color_table, flakes };
+        let paint = CarPaint {
+            coat,
+            diffuse,
+            lobes,
+            color_table,
+            flakes,
+        };
         paint.validate(limits)?;
         Ok(Self {
             name: header.name,

@@ -94,7 +94,11 @@ impl Flakes {
     /// The most clusters any slice has.
     #[must_use]
     pub fn widest_slice(&self) -> usize {
-        self.offsets.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)
+        self.offsets
+            .windows(2)
+            .map(|w| (w[1] - w[0]) as usize)
+            .max()
+            .unwrap_or(0)
     }
 }
 

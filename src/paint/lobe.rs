@@ -52,7 +52,11 @@ mod tests {
     /// Mirror direction at 30°, worked by hand: D = 1/α², G = 1 (2·0.866/0.866 = 2 > 1).
     #[test]
     fn the_mirror_direction_matches_hand_arithmetic() {
-        let lobe = Lobe { weight: [1.0; 3], alpha: 0.5, f0: 0.04 };
+        let lobe = Lobe {
+            weight: [1.0; 3],
+            alpha: 0.5,
+            f0: 0.04,
+        };
         let (s, c) = 30.0_f64.to_radians().sin_cos();
         let h = half_angles([-s, 0.0, c], [s, 0.0, c]);
         let schlick = 0.04 + 0.96 * (1.0 - c).powi(5);
@@ -67,8 +71,16 @@ mod tests {
                 let x = (1.0_f64 - z * z).sqrt();
                 for wo in [[x, 0.0, z], [-x, 0.0, z], [0.0, x, z], [0.0, 0.0, 1.0]] {
                     let h = half_angles([x, 0.0, z], wo);
-                    let f = Lobe { weight: [1.0; 3], alpha, f0: 1.0 }.shape(&h, z, wo[2]);
-                    assert!(f.is_finite() && f >= 0.0, "alpha {alpha}, z {z}, wo {wo:?}: {f}");
+                    let f = Lobe {
+                        weight: [1.0; 3],
+                        alpha,
+                        f0: 1.0,
+                    }
+                    .shape(&h, z, wo[2]);
+                    assert!(
+                        f.is_finite() && f >= 0.0,
+                        "alpha {alpha}, z {z}, wo {wo:?}: {f}"
+                    );
                 }
             }
         }

@@ -48,10 +48,21 @@ impl<'a> Reflectance<'a> {
     /// Prepares a paint: one pass over its color table and its clusters.
     #[must_use]
     pub fn new(paint: &'a CarPaint) -> Self {
-        let chi = paint.color_table.nodes().iter().map(|lab| lab.to_rgb()).collect();
-        let flake_means =
-            paint.flakes.as_ref().map_or_else(Vec::new, |f| (0..f.slices()).map(|k| f.slice_at(k).mean()).collect());
-        Self { paint, chi, overall: paint.color_table.overall().to_rgb(), flake_means }
+        let chi = paint
+            .color_table
+            .nodes()
+            .iter()
+            .map(|lab| lab.to_rgb())
+            .collect();
+        let flake_means = paint.flakes.as_ref().map_or_else(Vec::new, |f| {
+            (0..f.slices()).map(|k| f.slice_at(k).mean()).collect()
+        });
+        Self {
+            paint,
+            chi,
+            overall: paint.color_table.overall().to_rgb(),
+            flake_means,
+        }
     }
 
     /// The paint that was prepared.
@@ -77,7 +88,9 @@ impl<'a> Reflectance<'a> {
     /// A coat's perfect mirror image is left out: see [`Reflectance::mirror`].
     #[must_use]
     pub fn evaluate(&self, wi: Direction, wo: Direction, chi: Chi) -> LinearRgb {
-        let Some(t) = self.terms(wi, wo, chi) else { return [0.0; 3] };
+        let Some(t) = self.terms(wi, wo, chi) else {
+            return [0.0; 3];
+        };
         std::array::from_fn(|k| (t.transmission * (t.base[k] + t.flakes[k]) + t.highlight).max(0.0))
     }
 
@@ -132,7 +145,9 @@ impl<'a> Reflectance<'a> {
     }
 
     fn mean_flakes(&self, half: &HalfAngles) -> LinearRgb {
-        let Some(flakes) = &self.paint.flakes else { return [0.0; 3] };
+        let Some(flakes) = &self.paint.flakes else {
+            return [0.0; 3];
+        };
         at_angles(&self.flake_means, &flakes.theta_h, &flakes.theta_d, half)
     }
 }

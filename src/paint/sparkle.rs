@@ -57,13 +57,26 @@ impl TexelDraw {
         #[allow(clippy::cast_precision_loss)] // eight bits
         let phase_h = ((cell & 0xff) as f32 + 0.5) / 256.0;
         let h = epoch(theta_h_deg, persistence_deg[0], phase_h);
-        let d = epoch(theta_d_deg, persistence_deg[1], unit(mix(cell ^ 0x85eb_ca6b)));
+        let d = epoch(
+            theta_d_deg,
+            persistence_deg[1],
+            unit(mix(cell ^ 0x85eb_ca6b)),
+        );
         let key = mix(cell ^ mix(h ^ mix(d ^ 0xc2b2_ae35)));
-        let spread = h.wrapping_mul(2).wrapping_add(1).wrapping_mul(d.wrapping_mul(2).wrapping_add(1));
-        let turned = cell.wrapping_mul(spread).wrapping_add(h.wrapping_add(d).wrapping_mul(EPOCH_TURN));
+        let spread = h
+            .wrapping_mul(2)
+            .wrapping_add(1)
+            .wrapping_mul(d.wrapping_mul(2).wrapping_add(1));
+        let turned = cell
+            .wrapping_mul(spread)
+            .wrapping_add(h.wrapping_add(d).wrapping_mul(EPOCH_TURN));
         Self {
             pick: unit(turned),
-            place: [unit(mix(key ^ 0x2545_f491)), unit(mix(key ^ 0x51ed_270b)), unit(mix(key ^ 0x7feb_352d))],
+            place: [
+                unit(mix(key ^ 0x2545_f491)),
+                unit(mix(key ^ 0x51ed_270b)),
+                unit(mix(key ^ 0x7feb_352d)),
+            ],
         }
     }
 }
@@ -111,14 +124,24 @@ impl<'a> FlakeSampler<'a> {
             let slice = &cumulative[first..];
             let part = |j: u16| f32::from(j) / f32::from(GUIDED);
             guide.extend((0..GUIDED).map(|j| {
-                slice.partition_point(|&c| c <= part(j)).min(slice.len() - 1).min(usize::from(u16::MAX)) as u16
+                slice
+                    .partition_point(|&c| c <= part(j))
+                    .min(slice.len() - 1)
+                    .min(usize::from(u16::MAX)) as u16
             }));
         }
         let root = |lab: &[f32; 3]| [(lab[0] + 16.0) / 116.0, lab[1] / 500.0, lab[2] / 200.0];
-        let boxes = flakes.lower.iter().zip(&flakes.upper).map(|(lower, upper)| {
-            let (lower, upper) = (root(lower), root(upper));
-            RootBox { lower, extent: std::array::from_fn(|k| upper[k] - lower[k]) }
-        });
+        let boxes = flakes
+            .lower
+            .iter()
+            .zip(&flakes.upper)
+            .map(|(lower, upper)| {
+                let (lower, upper) = (root(lower), root(upper));
+                RootBox {
+                    lower,
+                    extent: std::array::from_fn(|k| upper[k] - lower[k]),
+                }
+            });
         let column = |xyz: [f64; 3]| xyz_to_rgb(xyz).map(|v| (v / std::f64::consts::PI) as f32);
         Self {
             flakes,
@@ -128,8 +151,14 @@ impl<'a> FlakeSampler<'a> {
             cumulative,
             guide,
             boxes: boxes.collect(),
-            means: (0..flakes.slices()).map(|k| flakes.slice_at(k).mean().map(|v| v as f32)).collect(),
-            to_rgb: [column([D65_2.x, 0.0, 0.0]), column([0.0, D65_2.y, 0.0]), column([0.0, 0.0, D65_2.z])],
+            means: (0..flakes.slices())
+                .map(|k| flakes.slice_at(k).mean().map(|v| v as f32))
+                .collect(),
+            to_rgb: [
+                column([D65_2.x, 0.0, 0.0]),
+                column([0.0, D65_2.y, 0.0]),
+                column([0.0, 0.0, D65_2.z]),
+            ],
         }
     }
 
@@ -153,13 +182,24 @@ impl<'a> FlakeSampler<'a> {
 
     /// [`FlakeSampler::color`], and the mean over all cells at the same angles.
     #[must_use]
-    pub fn color_and_mean(&self, cell: u32, theta_h_deg: f32, theta_d_deg: f32) -> ([f32; 3], [f32; 3]) {
+    pub fn color_and_mean(
+        &self,
+        cell: u32,
+        theta_h_deg: f32,
+        theta_d_deg: f32,
+    ) -> ([f32; 3], [f32; 3]) {
         let draw = TexelDraw::of(cell, theta_h_deg, theta_d_deg, self.persistence);
-        let (row, column) = (self.theta_h.bracket(theta_h_deg), self.theta_d.bracket(theta_d_deg));
+        let (row, column) = (
+            self.theta_h.bracket(theta_h_deg),
+            self.theta_d.bracket(theta_d_deg),
+        );
         let columns = self.flakes.theta_d.len();
         let (mut sum, mut mean) = ([0.0; 3], [0.0; 3]);
         for (h, wh) in [(row.low, 1.0 - row.fraction), (row.high, row.fraction)] {
-            for (d, wd) in [(column.low, 1.0 - column.fraction), (column.high, column.fraction)] {
+            for (d, wd) in [
+                (column.low, 1.0 - column.fraction),
+                (column.high, column.fraction),
+            ] {
                 if wh * wd > 0.0 {
                     let slice = h * columns + d;
                     let drawn = self.draw(slice, draw);
@@ -170,18 +210,27 @@ impl<'a> FlakeSampler<'a> {
                 }
             }
         }
-        let rgb = |k| sum[0] * self.to_rgb[0][k] + sum[1] * self.to_rgb[1][k] + sum[2] * self.to_rgb[2][k];
+        let rgb = |k| {
+            sum[0] * self.to_rgb[0][k] + sum[1] * self.to_rgb[1][k] + sum[2] * self.to_rgb[2][k]
+        };
         (std::array::from_fn(rgb), mean)
     }
 
     /// Mean flake reflectance in 1/sr at an angle pair in degrees, as `Reflectance` has it.
     #[must_use]
     pub fn mean(&self, theta_h_deg: f32, theta_d_deg: f32) -> [f32; 3] {
-        let (row, column) = (self.theta_h.bracket(theta_h_deg), self.theta_d.bracket(theta_d_deg));
+        let (row, column) = (
+            self.theta_h.bracket(theta_h_deg),
+            self.theta_d.bracket(theta_d_deg),
+        );
         let columns = self.flakes.theta_d.len();
         let at = |h: usize, d: usize| self.means[h * columns + d];
-        let corners =
-            [at(row.low, column.low), at(row.low, column.high), at(row.high, column.low), at(row.high, column.high)];
+        let corners = [
+            at(row.low, column.low),
+            at(row.low, column.high),
+            at(row.high, column.low),
+            at(row.high, column.high),
+        ];
         let (u, v) = (row.fraction, column.fraction);
         let weights = [(1.0 - u) * (1.0 - v), (1.0 - u) * v, u * (1.0 - v), u * v];
         std::array::from_fn(|k| {
@@ -194,15 +243,20 @@ impl<'a> FlakeSampler<'a> {
 
     /// XYZ over white of one draw from slice `k`.
     fn draw(&self, k: usize, draw: TexelDraw) -> [f32; 3] {
-        let (first, end) = (self.flakes.offsets[k] as usize, self.flakes.offsets[k + 1] as usize);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below GUIDED, for pick is below 1
+        let (first, end) = (
+            self.flakes.offsets[k] as usize,
+            self.flakes.offsets[k + 1] as usize,
+        );
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // below GUIDED, for pick is below 1
         let part = (draw.pick * f32::from(GUIDED)) as usize;
         let mut cluster = first + self.guide[k * usize::from(GUIDED) + part] as usize;
         while cluster + 1 < end && self.cumulative[cluster] <= draw.pick {
             cluster += 1;
         }
         let RootBox { lower, extent } = self.boxes[cluster];
-        let [y, u, v]: [f32; 3] = std::array::from_fn(|axis| lower[axis] + extent[axis] * draw.place[axis]);
+        let [y, u, v]: [f32; 3] =
+            std::array::from_fn(|axis| lower[axis] + extent[axis] * draw.place[axis]);
         [expand_f32(y + u), expand_f32(y), expand_f32(y - v)]
     }
 }

@@ -68,7 +68,11 @@ fn within(
     if (low..=high).contains(&value) {
         return Ok(());
     }
-    Err(PaintError::Range { field: field(), value, accepted })
+    Err(PaintError::Range {
+        field: field(),
+        value,
+        accepted,
+    })
 }
 
 impl CarPaint {
@@ -82,67 +86,146 @@ impl CarPaint {
             coat.validate()?;
         }
         for (channel, &value) in self.diffuse.iter().enumerate() {
-            within(|| format!("diffuse[{channel}]"), value, 0.0, MAX_WEIGHT, "0 to 1000")?;
+            within(
+                || format!("diffuse[{channel}]"),
+                value,
+                0.0,
+                MAX_WEIGHT,
+                "0 to 1000",
+            )?;
         }
         if self.lobes.len() > limits.lobes {
             let accepted = format!("0 to {}", limits.lobes);
-            return Err(PaintError::Count { field: "lobes".into(), count: self.lobes.len(), accepted });
+            return Err(PaintError::Count {
+                field: "lobes".into(),
+                count: self.lobes.len(),
+                accepted,
+            });
         }
         for (k, lobe) in self.lobes.iter().enumerate() {
             lobe.validate(k)?;
         }
         for (k, lab) in self.color_table.nodes().iter().enumerate() {
             for value in lab.to_array() {
-                within(|| format!("color_table[{k}]"), value, -MAX_LAB, MAX_LAB, "-2000 to 2000")?;
+                within(
+                    || format!("color_table[{k}]"),
+                    value,
+                    -MAX_LAB,
+                    MAX_LAB,
+                    "-2000 to 2000",
+                )?;
             }
         }
-        self.flakes.as_ref().map_or(Ok(()), |flakes| flakes.validate(limits))
+        self.flakes
+            .as_ref()
+            .map_or(Ok(()), |flakes| flakes.validate(limits))
     }
 }
 
 impl Coat {
     fn validate(&self) -> Result<(), PaintError> {
         within(|| "coat.ior".into(), self.ior, 1.0, 4.0, "1 to 4")?;
-        within(|| "coat.roughness".into(), self.roughness, 0.0, 1.0, "0 to 1")?;
+        within(
+            || "coat.roughness".into(),
+            self.roughness,
+            0.0,
+            1.0,
+            "0 to 1",
+        )?;
         let thickness = self.thickness_um.unwrap_or(1.0);
-        within(|| "coat.thickness_um".into(), thickness, 0.0, 1e6, "0 to 1000000")
+        within(
+            || "coat.thickness_um".into(),
+            thickness,
+            0.0,
+            1e6,
+            "0 to 1000000",
+        )
     }
 }
 
 impl Lobe {
     fn validate(&self, k: usize) -> Result<(), PaintError> {
         for (channel, &value) in self.weight.iter().enumerate() {
-            within(|| format!("lobes[{k}].weight[{channel}]"), value, 0.0, MAX_WEIGHT, "0 to 1000")?;
+            within(
+                || format!("lobes[{k}].weight[{channel}]"),
+                value,
+                0.0,
+                MAX_WEIGHT,
+                "0 to 1000",
+            )?;
         }
-        within(|| format!("lobes[{k}].alpha"), self.alpha, f64::MIN_POSITIVE, MAX_ALPHA, "above 0, to 10")?;
+        within(
+            || format!("lobes[{k}].alpha"),
+            self.alpha,
+            f64::MIN_POSITIVE,
+            MAX_ALPHA,
+            "above 0, to 10",
+        )?;
         within(|| format!("lobes[{k}].f0"), self.f0, 0.0, 1.0, "0 to 1")
     }
 }
 
 impl Flakes {
     fn validate(&self, limits: &Limits) -> Result<(), PaintError> {
-        let shape = |field: &str, reason: String| Err(PaintError::Shape { field: field.into(), reason });
+        let shape = |field: &str, reason: String| {
+            Err(PaintError::Shape {
+                field: field.into(),
+                reason,
+            })
+        };
         if self.offsets.len() != self.slices() + 1 {
-            return shape("flakes.offsets", format!("{} offsets for {} slices", self.offsets.len(), self.slices()));
+            return shape(
+                "flakes.offsets",
+                format!(
+                    "{} offsets for {} slices",
+                    self.offsets.len(),
+                    self.slices()
+                ),
+            );
         }
         let clusters = self.offsets.last().map_or(0, |&last| last as usize);
         let lengths = [self.probability.len(), self.lower.len(), self.upper.len()];
         if lengths != [clusters; 3] || self.offsets[0] != 0 {
-            return shape("flakes.clusters", format!("offsets name {clusters} clusters, the lists hold {lengths:?}"));
+            return shape(
+                "flakes.clusters",
+                format!("offsets name {clusters} clusters, the lists hold {lengths:?}"),
+            );
         }
         for (k, pair) in self.offsets.windows(2).enumerate() {
             let count = (pair[1] as usize).saturating_sub(pair[0] as usize);
             if pair[1] <= pair[0] || count > limits.clusters {
                 let accepted = format!("1 to {}", limits.clusters);
-                return Err(PaintError::Count { field: format!("flakes.slices[{k}]"), count, accepted });
+                return Err(PaintError::Count {
+                    field: format!("flakes.slices[{k}]"),
+                    count,
+                    accepted,
+                });
             }
             self.validate_slice(k, count)?;
         }
         let t = &self.texture;
-        within(|| "flakes.texel_um".into(), t.texel_um, f64::MIN_POSITIVE, 1e5, "above 0, to 100000")?;
-        within(|| "flakes.grain_um".into(), t.grain_um, f64::MIN_POSITIVE, 1e6, "above 0, to 1000000")?;
+        within(
+            || "flakes.texel_um".into(),
+            t.texel_um,
+            f64::MIN_POSITIVE,
+            1e5,
+            "above 0, to 100000",
+        )?;
+        within(
+            || "flakes.grain_um".into(),
+            t.grain_um,
+            f64::MIN_POSITIVE,
+            1e6,
+            "above 0, to 1000000",
+        )?;
         for angle in t.lifetime_deg.iter().chain(&t.persistence_deg) {
-            within(|| "flakes.lifetime_deg".into(), *angle, f64::MIN_POSITIVE, 1e4, "above 0, to 10000")?;
+            within(
+                || "flakes.lifetime_deg".into(),
+                *angle,
+                f64::MIN_POSITIVE,
+                1e4,
+                "above 0, to 10000",
+            )?;
         }
         Ok(())
     }
@@ -151,20 +234,42 @@ impl Flakes {
         let slice = self.slice_at(k);
         let mut sum = 0.0;
         for (c, &p) in slice.probability.iter().enumerate() {
-            within(|| format!("flakes.slices[{k}].probability[{c}]"), p, 0.0, 1.0, "0 to 1")?;
+            within(
+                || format!("flakes.slices[{k}].probability[{c}]"),
+                p,
+                0.0,
+                1.0,
+                "0 to 1",
+            )?;
             sum += p;
         }
         #[allow(clippy::cast_precision_loss)] // at most a few thousand
         let rounding = 1e-12 * count as f64;
         if (sum - 1.0).abs() > rounding {
             let field = format!("flakes.slices[{k}].probability");
-            return Err(PaintError::Range { field, value: sum, accepted: "probabilities that sum to 1" });
+            return Err(PaintError::Range {
+                field,
+                value: sum,
+                accepted: "probabilities that sum to 1",
+            });
         }
         for (c, (lower, upper)) in slice.lower.iter().zip(slice.upper).enumerate() {
             for axis in 0..3 {
                 let field = || format!("flakes.slices[{k}].box[{c}][{axis}]");
-                within(field, f64::from(lower[axis]), -MAX_LAB, MAX_LAB, "-2000 to 2000")?;
-                within(field, f64::from(upper[axis]), f64::from(lower[axis]), MAX_LAB, "the lower corner to 2000")?;
+                within(
+                    field,
+                    f64::from(lower[axis]),
+                    -MAX_LAB,
+                    MAX_LAB,
+                    "-2000 to 2000",
+                )?;
+                within(
+                    field,
+                    f64::from(upper[axis]),
+                    f64::from(lower[axis]),
+                    MAX_LAB,
+                    "the lower corner to 2000",
+                )?;
             }
         }
         Ok(())

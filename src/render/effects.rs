@@ -56,7 +56,11 @@ impl EffectPlan {
         let lobes = paint.lobes.iter().filter(|lobe| !lobe.is_absent()).count();
         let table = paint.color_table.nodes().len();
         let sweep = scene.background == super::Background::Sweep;
-        let line = |effect, simulated, reason: String| PlannedEffect { effect, simulated, reason };
+        let line = |effect, simulated, reason: String| PlannedEffect {
+            effect,
+            simulated,
+            reason,
+        };
         let effects = vec![
             line(
                 Effect::Coat,
@@ -69,10 +73,17 @@ impl EffectPlan {
                 match coat {
                     None => "the paint is uncoated".into(),
                     Some(c) if c.is_mirror() => "the coat is smooth".into(),
-                    Some(c) => format!("the coat's roughness {} gives a highlight of finite width", c.roughness),
+                    Some(c) => format!(
+                        "the coat's roughness {} gives a highlight of finite width",
+                        c.roughness
+                    ),
                 },
             ),
-            line(Effect::Lobes, lobes > 0, format!("{lobes} lobes with weight")),
+            line(
+                Effect::Lobes,
+                lobes > 0,
+                format!("{lobes} lobes with weight"),
+            ),
             line(Effect::ColorTable, true, format!("{table} angle pairs")),
             line(
                 Effect::Flakes,
@@ -85,13 +96,27 @@ impl EffectPlan {
             line(
                 Effect::Environment,
                 lit_by_environment,
-                if lit_by_environment { "sampled by its radiance" } else { "it is black" }.into(),
+                if lit_by_environment {
+                    "sampled by its radiance"
+                } else {
+                    "it is black"
+                }
+                .into(),
             ),
-            line(Effect::DirectionalLights, !scene.lights.is_empty(), format!("{} lights", scene.lights.len())),
+            line(
+                Effect::DirectionalLights,
+                !scene.lights.is_empty(),
+                format!("{} lights", scene.lights.len()),
+            ),
             line(
                 Effect::GroundShadow,
                 sweep,
-                if sweep { "the object stands on a sweep" } else { "the environment is the background" }.into(),
+                if sweep {
+                    "the object stands on a sweep"
+                } else {
+                    "the environment is the background"
+                }
+                .into(),
             ),
         ];
         Self { effects }
@@ -100,6 +125,8 @@ impl EffectPlan {
     /// Whether an effect is simulated.
     #[must_use]
     pub fn has(&self, effect: Effect) -> bool {
-        self.effects.iter().any(|e| e.effect == effect && e.simulated)
+        self.effects
+            .iter()
+            .any(|e| e.effect == effect && e.simulated)
     }
 }

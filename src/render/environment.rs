@@ -74,7 +74,11 @@ impl Environment {
             let sine2 = (f32::from(ring) + 0.5) / f32::from(rings);
             for spoke in 0..spokes {
                 let turn = TAU * (f32::from(spoke) + 0.5) / f32::from(spokes);
-                let direction = [sine2.sqrt() * turn.cos(), (1.0 - sine2).sqrt(), sine2.sqrt() * turn.sin()];
+                let direction = [
+                    sine2.sqrt() * turn.cos(),
+                    (1.0 - sine2).sqrt(),
+                    sine2.sqrt() * turn.sin(),
+                ];
                 sum += luminance(self.radiance(direction));
             }
         }
@@ -88,27 +92,45 @@ pub(super) fn luminance(rgb: Vec3) -> f32 {
 
 impl Map {
     fn radiance(&self, d: Vec3) -> Vec3 {
-        self.at((d[0].atan2(-d[2]) / TAU).rem_euclid(1.0), d[1].clamp(-1.0, 1.0).acos() / PI)
+        self.at(
+            (d[0].atan2(-d[2]) / TAU).rem_euclid(1.0),
+            d[1].clamp(-1.0, 1.0).acos() / PI,
+        )
     }
 
     /// Radiance at a place on the map, `u`, `v` in `0..=1`.
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss
+    )]
     pub(super) fn at(&self, u: f32, v: f32) -> Vec3 {
         let (w, h) = (self.width as f32, self.height as f32);
         let u = u * w - 0.5;
         let v = (v * h - 0.5).clamp(0.0, h - 1.0);
         let (left, top) = (u.floor(), (v as usize).min(self.height - 1));
-        let (x0, y1) = (left.rem_euclid(w) as usize % self.width, (top + 1).min(self.height - 1));
+        let (x0, y1) = (
+            left.rem_euclid(w) as usize % self.width,
+            (top + 1).min(self.height - 1),
+        );
         let x1 = (x0 + 1) % self.width;
         let pixel = |x: usize, y: usize| self.pixels[y * self.width + x];
         let (s, t) = (u - left, v - v.floor());
-        mix(mix(pixel(x0, top), pixel(x1, top), s), mix(pixel(x0, y1), pixel(x1, y1), s), t)
+        mix(
+            mix(pixel(x0, top), pixel(x1, top), s),
+            mix(pixel(x0, y1), pixel(x1, y1), s),
+            t,
+        )
     }
 
     /// Direction of a place on the map, `u`, `v` in `0..1`.
     pub(super) fn direction(u: f32, v: f32) -> Vec3 {
         let (theta, turn) = (v * PI, u * TAU);
-        [theta.sin() * turn.sin(), theta.cos(), -theta.sin() * turn.cos()]
+        [
+            theta.sin() * turn.sin(),
+            theta.cos(),
+            -theta.sin() * turn.cos(),
+        ]
     }
 }
 
@@ -121,12 +143,19 @@ mod tests {
     fn a_map_is_read_where_it_was_written() {
         let (width, height) = (8, 4);
         let pixels = (0..width * height).map(|k| [k as f32, 0.0, 1.0]).collect();
-        let environment = Environment::map(Map { width, height, pixels });
+        let environment = Environment::map(Map {
+            width,
+            height,
+            pixels,
+        });
         for y in 0..height {
             for x in 0..width {
                 let d = Map::direction((x as f32 + 0.5) / 8.0, (y as f32 + 0.5) / 4.0);
                 let got = environment.radiance(d);
-                assert!((got[0] - (y * width + x) as f32).abs() < 1e-3, "{x} {y} {got:?}");
+                assert!(
+                    (got[0] - (y * width + x) as f32).abs() < 1e-3,
+                    "{x} {y} {got:?}"
+                );
             }
         }
     }

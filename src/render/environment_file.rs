@@ -67,22 +67,44 @@ impl Environment {
         };
         for (k, pixel) in pixels.iter_mut().enumerate() {
             if pixel.iter().any(|v| v.is_nan()) {
-                return Err(EnvironmentError::NotANumber { x: k % width, y: k / width });
+                return Err(EnvironmentError::NotANumber {
+                    x: k % width,
+                    y: k / width,
+                });
             }
             *pixel = pixel.map(|v| v.clamp(0.0, MOST_LIGHT));
         }
-        Ok(Self::map(Map { width, height, pixels }))
+        Ok(Self::map(Map {
+            width,
+            height,
+            pixels,
+        }))
     }
 }
 
 type Pixels = (usize, usize, Vec<Vec3>);
 
-fn check(width: u64, height: u64, limits: &Limits, format: &'static str) -> Result<(usize, usize), EnvironmentError> {
+fn check(
+    width: u64,
+    height: u64,
+    limits: &Limits,
+    format: &'static str,
+) -> Result<(usize, usize), EnvironmentError> {
     if width == 0 || height == 0 {
-        return Err(EnvironmentError::Damaged { format, reason: format!("{width} x {height} pixels") });
+        return Err(EnvironmentError::Damaged {
+            format,
+            reason: format!("{width} x {height} pixels"),
+        });
     }
-    let too_large = || EnvironmentError::Size { width, height, accepted: limits.pixels };
-    if width.checked_mul(height).is_none_or(|pixels| pixels > limits.pixels) {
+    let too_large = || EnvironmentError::Size {
+        width,
+        height,
+        accepted: limits.pixels,
+    };
+    if width
+        .checked_mul(height)
+        .is_none_or(|pixels| pixels > limits.pixels)
+    {
         return Err(too_large());
     }
     let side = |v: u64| usize::try_from(v).map_err(|_| too_large());
@@ -91,34 +113,55 @@ fn check(width: u64, height: u64, limits: &Limits, format: &'static str) -> Resu
 
 fn read_hdr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
     const FORMAT: &str = "Radiance .hdr";
-    let damaged = |e: image::ImageError| EnvironmentError::Damaged { format: FORMAT, reason: e.to_string() };
-    let decoder = image::codecs::hdr::HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(damaged)?;
+    let damaged = |e: image::ImageError| EnvironmentError::Damaged {
+        format: FORMAT,
+        reason: e.to_string(),
+    };
+    let decoder =
+        image::codecs::hdr::HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(damaged)?;
     let (w, h) = decoder.dimensions();
     let (width, height) = check(w.into(), h.into(), limits, FORMAT)?;
     let mut pixels: Vec<Vec3> = vec![[0.0; 3]; width * height];
-    decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(damaged)?;
+    decoder
+        .read_image(bytemuck::cast_slice_mut(&mut pixels))
+        .map_err(damaged)?;
     Ok((width, height, pixels))
 }
 
 fn read_exr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
     const FORMAT: &str = "OpenEXR";
-    let damaged = |e: exr::error::Error| EnvironmentError::Damaged { format: FORMAT, reason: e.to_string() };
+    let damaged = |e: exr::error::Error| EnvironmentError::Damaged {
+        format: FORMAT,
+        reason: e.to_string(),
+    };
     // The header alone first: the reader allocates what the header claims.
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
+    let meta =
+        exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     for header in &meta.headers {
         let size = header.layer_size;
         check(size.width() as u64, size.height() as u64, limits, FORMAT)?;
         // exr 1.74 allocates whatever a damaged DWA block claims, terabytes included, before it looks at the data.
-        if matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
+        if matches!(
+            header.compression,
+            Compression::DWAA(_) | Compression::DWAB(_)
+        ) {
             let reason = "DWA compression is not read; store the picture with ZIP or PIZ".into();
-            return Err(EnvironmentError::Damaged { format: FORMAT, reason });
+            return Err(EnvironmentError::Damaged {
+                format: FORMAT,
+                reason,
+            });
         }
     }
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
         .rgb_channels(
-            |size, _| (size.width(), vec![[0.0_f32; 3]; size.width() * size.height()]),
+            |size, _| {
+                (
+                    size.width(),
+                    vec![[0.0_f32; 3]; size.width() * size.height()],
+                )
+            },
             |(width, pixels): &mut (usize, Vec<Vec3>), at, (r, g, b): (f32, f32, f32)| {
                 if let Some(pixel) = pixels.get_mut(at.y() * *width + at.x()) {
                     *pixel = [r, g, b];
@@ -133,7 +176,10 @@ fn read_exr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
     let (width, pixels) = image.layer_data.channel_data.pixels;
     let height = image.layer_data.size.height();
     if pixels.len() != width * height || pixels.is_empty() {
-        return Err(EnvironmentError::Damaged { format: FORMAT, reason: "pixels are missing".into() });
+        return Err(EnvironmentError::Damaged {
+            format: FORMAT,
+            reason: "pixels are missing".into(),
+        });
     }
     Ok((width, height, pixels))
 }
@@ -145,21 +191,36 @@ mod tests {
 
     fn hdr() -> Vec<u8> {
         let mut bytes = Vec::new();
-        let pixels: Vec<image::Rgb<f32>> = (0..32_u8).map(|k| image::Rgb([f32::from(k), 0.5, 2.0])).collect();
-        image::codecs::hdr::HdrEncoder::new(&mut bytes).encode(&pixels, 8, 4).expect("encodes");
+        let pixels: Vec<image::Rgb<f32>> = (0..32_u8)
+            .map(|k| image::Rgb([f32::from(k), 0.5, 2.0]))
+            .collect();
+        image::codecs::hdr::HdrEncoder::new(&mut bytes)
+            .encode(&pixels, 8, 4)
+            .expect("encodes");
         bytes
     }
 
     fn sky(bad: f32) -> Vec<u8> {
-        write_exr(8, 4, |k| if k == 11 { (bad, 1.0, 1.0) } else { (0.5_f32, 1.0, 2.0) }).expect("encodes")
+        write_exr(8, 4, |k| {
+            if k == 11 {
+                (bad, 1.0, 1.0)
+            } else {
+                (0.5_f32, 1.0, 2.0)
+            }
+        })
+        .expect("encodes")
     }
 
     #[test]
     fn both_formats_are_read() {
         let limits = Limits::default();
-        let up = Environment::from_bytes(&sky(0.5), &limits).expect("exr").radiance([0.0, 1.0, 0.0]);
+        let up = Environment::from_bytes(&sky(0.5), &limits)
+            .expect("exr")
+            .radiance([0.0, 1.0, 0.0]);
         assert!((up[0] - 0.5).abs() < 1e-6 && (up[2] - 2.0).abs() < 1e-6);
-        let somewhere = Environment::from_bytes(&hdr(), &limits).expect("hdr").radiance([0.0, 0.2, 0.9]);
+        let somewhere = Environment::from_bytes(&hdr(), &limits)
+            .expect("hdr")
+            .radiance([0.0, 0.2, 0.9]);
         assert!((somewhere[2] - 2.0).abs() < 0.02);
     }
 
@@ -167,27 +228,45 @@ mod tests {
     fn pixels_that_are_no_light_are_refused_or_held() {
         let limits = Limits::default();
         let error = Environment::from_bytes(&sky(f32::NAN), &limits).expect_err("NaN");
-        assert!(matches!(error, EnvironmentError::NotANumber { x: 3, y: 1 }), "{error}");
+        assert!(
+            matches!(error, EnvironmentError::NotANumber { x: 3, y: 1 }),
+            "{error}"
+        );
         for light in [f32::INFINITY, -1.0, 1e30] {
-            let level = Environment::from_bytes(&sky(light), &limits).expect("held").level();
+            let level = Environment::from_bytes(&sky(light), &limits)
+                .expect("held")
+                .level();
             assert!(level.is_finite() && level >= 0.0);
         }
     }
 
     #[test]
     fn sizes_are_checked_before_anything_is_allocated() {
-        let limits = Limits { pixels: 31, ..Limits::default() };
+        let limits = Limits {
+            pixels: 31,
+            ..Limits::default()
+        };
         for bytes in [hdr(), sky(0.5)] {
-            assert!(matches!(Environment::from_bytes(&bytes, &limits), Err(EnvironmentError::Size { .. })));
+            assert!(matches!(
+                Environment::from_bytes(&bytes, &limits),
+                Err(EnvironmentError::Size { .. })
+            ));
         }
     }
 
     #[test]
     fn cut_and_damaged_files_are_errors_or_pictures_never_panics() {
-        let limits = Limits { pixels: 1 << 20, ..Limits::default() };
+        let limits = Limits {
+            pixels: 1 << 20,
+            ..Limits::default()
+        };
         for whole in [hdr(), sky(0.5)] {
             for cut in 0..whole.len() {
-                assert!(Environment::from_bytes(&whole[..cut], &limits).is_err(), "cut to {cut} of {}", whole.len());
+                assert!(
+                    Environment::from_bytes(&whole[..cut], &limits).is_err(),
+                    "cut to {cut} of {}",
+                    whole.len()
+                );
             }
             for k in 0..whole.len() {
                 for bit in 0..8 {

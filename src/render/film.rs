@@ -40,7 +40,12 @@ pub enum FilmError {
 
 impl Film {
     pub(super) fn new(width: u32, height: u32, exposure: f32, pixels: Vec<Vec3>) -> Self {
-        Self { width, height, exposure, pixels }
+        Self {
+            width,
+            height,
+            exposure,
+            pixels,
+        }
     }
 
     /// Pixels across.
@@ -84,7 +89,12 @@ impl Film {
     pub fn to_png(&self) -> Result<Vec<u8>, FilmError> {
         let mut bytes = Vec::new();
         PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
-            .write_image(&self.to_srgb8(), self.width, self.height, ExtendedColorType::Rgb8)
+            .write_image(
+                &self.to_srgb8(),
+                self.width,
+                self.height,
+                ExtendedColorType::Rgb8,
+            )
             .map_err(|e| FilmError::Png(e.to_string()))?;
         Ok(bytes)
     }
@@ -105,10 +115,15 @@ impl Film {
     ///
     /// [`FilmError::Sheet`] for no pictures, or sizes that differ.
     pub fn contact_sheet(films: &[Self], columns: usize) -> Result<Self, FilmError> {
-        let first = films.first().ok_or_else(|| FilmError::Sheet("there are none".into()))?;
+        let first = films
+            .first()
+            .ok_or_else(|| FilmError::Sheet("there are none".into()))?;
         let (w, h) = (first.width, first.height);
         if let Some(other) = films.iter().find(|f| (f.width, f.height) != (w, h)) {
-            return Err(FilmError::Sheet(format!("{w} x {h} and {} x {}", other.width, other.height)));
+            return Err(FilmError::Sheet(format!(
+                "{w} x {h} and {} x {}",
+                other.width, other.height
+            )));
         }
         let columns = columns.clamp(1, films.len());
         let mut pixels = Vec::new();
@@ -118,11 +133,15 @@ impl Film {
                     let range = y * w as usize..(y + 1) * w as usize;
                     match row.get(k) {
                         // Exposed here: the sheet has one exposure, its pictures may differ.
-                        Some(film) => pixels.extend(film.pixels[range].iter().map(|p| p.map(|v| v * film.exposure))),
-                        // An empty place takes the first picture's background.
-                        None => pixels.extend(
-                            range.map(|k| first.pixels[k / w as usize * w as usize].map(|v| v * first.exposure)),
+                        Some(film) => pixels.extend(
+                            film.pixels[range]
+                                .iter()
+                                .map(|p| p.map(|v| v * film.exposure)),
                         ),
+                        // An empty place takes the first picture's background.
+                        None => pixels.extend(range.map(|k| {
+                            first.pixels[k / w as usize * w as usize].map(|v| v * first.exposure)
+                        })),
                     }
                 }
             }
@@ -131,7 +150,12 @@ impl Film {
             let count = u32::try_from(k).ok().and_then(|k| n.checked_mul(k));
             count.ok_or_else(|| FilmError::Sheet("the sheet is too large".into()))
         };
-        Ok(Self { width: size(w, columns)?, height: size(h, films.len().div_ceil(columns))?, exposure: 1.0, pixels })
+        Ok(Self {
+            width: size(w, columns)?,
+            height: size(h, films.len().div_ceil(columns))?,
+            exposure: 1.0,
+            pixels,
+        })
     }
 }
 
@@ -152,10 +176,15 @@ where
     S: exr::prelude::IntoSample,
 {
     use exr::prelude::{Blocks, Compression, LineOrder};
-    let encoding =
-        Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
     let columns = width as usize;
-    let channels = SpecificChannels::rgb(move |at: exr::prelude::Vec2<usize>| pixel(at.y() * columns + at.x()));
+    let channels = SpecificChannels::rgb(move |at: exr::prelude::Vec2<usize>| {
+        pixel(at.y() * columns + at.x())
+    });
     let mut bytes = Vec::new();
     Image::from_encoded_channels((columns, height as usize), encoding, channels)
         .write()
@@ -189,7 +218,9 @@ pub(super) mod tests {
     }
 
     fn ramp() -> Film {
-        let pixels = (0..12_u16).map(|k| [f32::from(k) * 0.25, 1.0 / (f32::from(k) + 1.0), -0.1]).collect();
+        let pixels = (0..12_u16)
+            .map(|k| [f32::from(k) * 0.25, 1.0 / (f32::from(k) + 1.0), -0.1])
+            .collect();
         Film::new(4, 3, 1.0, pixels)
     }
 
@@ -207,15 +238,23 @@ pub(super) mod tests {
     #[test]
     fn a_png_reads_back_as_the_screen_values() {
         let bytes = ramp().to_png().expect("encodes");
-        let picture = image::load_from_memory(&bytes).expect("reads back").to_rgb8();
+        let picture = image::load_from_memory(&bytes)
+            .expect("reads back")
+            .to_rgb8();
         assert_eq!(picture.dimensions(), (4, 3));
         assert_eq!(picture.into_raw(), ramp().to_srgb8());
     }
 
     #[test]
     fn the_same_picture_gives_the_same_bytes() {
-        assert_eq!(ramp().to_exr().expect("encodes"), ramp().to_exr().expect("encodes"));
-        assert_eq!(ramp().to_png().expect("encodes"), ramp().to_png().expect("encodes"));
+        assert_eq!(
+            ramp().to_exr().expect("encodes"),
+            ramp().to_exr().expect("encodes")
+        );
+        assert_eq!(
+            ramp().to_png().expect("encodes"),
+            ramp().to_png().expect("encodes")
+        );
     }
 
     #[test]
@@ -230,7 +269,9 @@ pub(super) mod tests {
 
     #[test]
     fn a_sheet_holds_its_pictures_in_rows() {
-        let films: Vec<Film> = (0..3_u8).map(|k| Film::new(2, 1, 1.0, vec![[f32::from(k); 3]; 2])).collect();
+        let films: Vec<Film> = (0..3_u8)
+            .map(|k| Film::new(2, 1, 1.0, vec![[f32::from(k); 3]; 2]))
+            .collect();
         let sheet = Film::contact_sheet(&films, 2).expect("one size");
         assert_eq!((sheet.width(), sheet.height()), (4, 2));
         let row: Vec<f32> = sheet.pixels().iter().map(|p| p[0]).collect();

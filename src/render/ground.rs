@@ -38,12 +38,17 @@ impl Ground {
         let place = |k: u16| (f32::from(k) / f32::from(NODES - 1) * 2.0 - 1.0) * REACH;
         let hidden = |z: u16, x: u16| {
             let from = [place(x), FLOOR_Y, place(z)];
-            let met = directions.iter().filter(|d| surface.meet(from, **d).is_some()).count();
+            let met = directions
+                .iter()
+                .filter(|d| surface.meet(from, **d).is_some())
+                .count();
             #[allow(clippy::cast_precision_loss)]
             let share = met as f32 / directions.len() as f32;
             share
         };
-        let rows = (0..NODES).into_par_iter().map(|z| (0..NODES).map(|x| hidden(z, x)).collect());
+        let rows = (0..NODES)
+            .into_par_iter()
+            .map(|z| (0..NODES).map(|x| hidden(z, x)).collect());
         Self::Grid(rows.collect::<Vec<Vec<f32>>>().concat())
     }
 
@@ -71,8 +76,12 @@ impl Ground {
     /// Where a ray meets the floor, if it does.
     pub(super) fn meet(origin: Vec3, direction: Vec3) -> Option<[f32; 2]> {
         let distance = (FLOOR_Y - origin[1]) / direction[1];
-        (direction[1] < -1e-5 && distance > 0.0)
-            .then(|| [origin[0] + direction[0] * distance, origin[2] + direction[2] * distance])
+        (direction[1] < -1e-5 && distance > 0.0).then(|| {
+            [
+                origin[0] + direction[0] * distance,
+                origin[2] + direction[2] * distance,
+            ]
+        })
     }
 }
 
@@ -85,7 +94,11 @@ mod tests {
     fn under_a_panel_it_is_darker_than_far_away() {
         for shape in [Shape::Capsule, Shape::Panel] {
             let ground = Ground::new(&Surface::new(shape));
-            assert!(ground.occlusion(0.0, 0.0) > 0.4, "{shape:?} {}", ground.occlusion(0.0, 0.0));
+            assert!(
+                ground.occlusion(0.0, 0.0) > 0.4,
+                "{shape:?} {}",
+                ground.occlusion(0.0, 0.0)
+            );
             assert!(ground.occlusion(3.0, 3.0) < 0.02);
         }
     }

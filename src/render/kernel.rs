@@ -69,15 +69,24 @@ impl<'a> Kernel<'a> {
     #[allow(clippy::cast_possible_truncation)] // pixels are f32
     pub(super) fn new(paint: &'a CarPaint) -> Self {
         let reflectance = Reflectance::new(paint);
-        let coat = paint.coat.map_or(CoatKernel::ABSENT, |coat| CoatKernel::new(&coat));
+        let coat = paint
+            .coat
+            .map_or(CoatKernel::ABSENT, |coat| CoatKernel::new(&coat));
         let present = || paint.lobes.iter().filter(|lobe| !lobe.is_absent());
         let mut lobes: Vec<LobeKernel> = present()
             .map(|lobe| {
                 let alpha = lobe.alpha.max(MIN_ALPHA) as f32;
                 let weight = lobe.weight.map(|s| s as f32 / PI);
-                let bright = weight.iter().fold(0.0_f32, |m, &w| m.max(w)) * (lobe.f0 as f32 + 0.04);
+                let bright =
+                    weight.iter().fold(0.0_f32, |m, &w| m.max(w)) * (lobe.f0 as f32 + 0.04);
                 let alpha2 = alpha * alpha;
-                LobeKernel { weight, alpha2, inverse_alpha2: 1.0 / alpha2, f0: lobe.f0 as f32, share: bright }
+                LobeKernel {
+                    weight,
+                    alpha2,
+                    inverse_alpha2: 1.0 / alpha2,
+                    f0: lobe.f0 as f32,
+                    share: bright,
+                }
             })
             .collect();
         let total: f32 = lobes.iter().map(|lobe| lobe.share).sum();
@@ -89,7 +98,11 @@ impl<'a> Kernel<'a> {
         Self {
             diffuse: paint.diffuse.map(|a| a as f32 / PI),
             lobes,
-            chi: reflectance.chi_nodes().iter().map(|rgb| rgb.map(|v| v as f32)).collect(),
+            chi: reflectance
+                .chi_nodes()
+                .iter()
+                .map(|rgb| rgb.map(|v| v as f32))
+                .collect(),
             chi_h: QuickGrid::new(paint.color_table.theta_h()),
             chi_d: QuickGrid::new(paint.color_table.theta_d()),
             coat,
@@ -102,14 +115,26 @@ impl<'a> Kernel<'a> {
     pub(super) fn view<const COATED: bool>(&self, outer: Lanes3) -> View {
         let outer = [outer[0], outer[1], outer[2].at_least(LEAST_COSINE)];
         if !COATED {
-            return View { outer, inner: outer, transmission: Lanes::splat(1.0) };
+            return View {
+                outer,
+                inner: outer,
+                transmission: Lanes::splat(1.0),
+            };
         }
-        View { outer, inner: self.coat.refract(outer), transmission: -self.coat.fresnel(outer[2]) + 1.0 }
+        View {
+            outer,
+            inner: self.coat.refract(outer),
+            transmission: -self.coat.fresnel(outer[2]) + 1.0,
+        }
     }
 
     /// Weight of the coat's mirror image.
     pub(super) fn mirror(&self, view: &View) -> Lanes {
-        if self.coat.mirror { -view.transmission + 1.0 } else { Lanes::splat(0.0) }
+        if self.coat.mirror {
+            -view.transmission + 1.0
+        } else {
+            Lanes::splat(0.0)
+        }
     }
 
     /// BRDF and density for light directions above the horizon; below it the answer means nothing, but is finite.
@@ -134,7 +159,8 @@ impl<'a> Kernel<'a> {
             if !self.coat.mirror {
                 let half = Half::of(outer, view.outer);
                 let d = half.beckmann(1.0 / self.coat.alpha2) * (1.0 / PI);
-                highlight = d * self.coat.fresnel(half.h_o) * 0.25 * half.masking(outer[2], view.outer[2]);
+                highlight =
+                    d * self.coat.fresnel(half.h_o) * 0.25 * half.masking(outer[2], view.outer[2]);
                 density = density + d * half.h_z * (self.coat.share * 0.25) / half.h_o;
             }
         }
@@ -161,7 +187,8 @@ impl<'a> Kernel<'a> {
             for (k, cell) in cells.iter().enumerate() {
                 let flake = match contrast {
                     Some(contrast) => {
-                        let (flake, mean) = flakes.color_and_mean(*cell, theta_h.0[k], theta_d.0[k]);
+                        let (flake, mean) =
+                            flakes.color_and_mean(*cell, theta_h.0[k], theta_d.0[k]);
                         mix(mean, flake, contrast.0[k])
                     }
                     None => flakes.mean(theta_h.0[k], theta_d.0[k]),
@@ -171,7 +198,10 @@ impl<'a> Kernel<'a> {
                 }
             }
         }
-        Answer { f: color.map(|v| v * transmission + highlight), density }
+        Answer {
+            f: color.map(|v| v * transmission + highlight),
+            density,
+        }
     }
 
     #[inline(always)]
@@ -181,7 +211,10 @@ impl<'a> Kernel<'a> {
         }
         let mut color = [Lanes::splat(0.0); 3];
         for k in 0..WIDTH {
-            let (row, column) = (self.chi_h.bracket(theta_h.0[k]), self.chi_d.bracket(theta_d.0[k]));
+            let (row, column) = (
+                self.chi_h.bracket(theta_h.0[k]),
+                self.chi_d.bracket(theta_d.0[k]),
+            );
             let node = bilinear(&self.chi, self.chi_d.len(), row, column);
             set(&mut color, k, node);
         }
@@ -213,7 +246,11 @@ impl<'a> Kernel<'a> {
             rest -= lobe.share;
             if rest < 0.0 || index == last {
                 let inner = mirrored(get(&view.inner, k), beckmann_half(lobe.alpha2, u, v))?;
-                return if COATED { self.coat.leave(inner) } else { Some(inner) };
+                return if COATED {
+                    self.coat.leave(inner)
+                } else {
+                    Some(inner)
+                };
             }
         }
         None
@@ -226,7 +263,11 @@ fn bilinear(table: &[Vec3], columns: usize, row: QuickBracket, column: QuickBrac
         let (low, high) = (at(r, column.low), at(r, column.high));
         along(scale(low, 1.0 - column.fraction), high, column.fraction)
     };
-    along(scale(across(row.low), 1.0 - row.fraction), across(row.high), row.fraction)
+    along(
+        scale(across(row.low), 1.0 - row.fraction),
+        across(row.high),
+        row.fraction,
+    )
 }
 
 #[cfg(test)]
@@ -239,16 +280,31 @@ mod tests {
 
     fn paint(coat: Option<Coat>) -> CarPaint {
         let grid = |d: &[f64]| AngleGrid::new(d.to_vec()).expect("ascending");
-        let nodes =
-            (0..12).map(|k| Lab { l: 95.0 - 6.0 * f64::from(k), a: 20.0 - f64::from(k), b: 4.0 * f64::from(k) });
+        let nodes = (0..12).map(|k| Lab {
+            l: 95.0 - 6.0 * f64::from(k),
+            a: 20.0 - f64::from(k),
+            b: 4.0 * f64::from(k),
+        });
         let (rows, columns) = (grid(&[0.0, 7.0, 25.0, 60.0]), grid(&[0.0, 20.0, 66.0]));
-        let overall = Lab { l: 70.0, a: 0.0, b: 0.0 };
+        let overall = Lab {
+            l: 70.0,
+            a: 0.0,
+            b: 0.0,
+        };
         CarPaint {
             coat,
             diffuse: [0.3, 0.2, 0.1],
             lobes: vec![
-                Lobe { weight: [0.05, 0.06, 0.07], alpha: 0.4, f0: 0.3 },
-                Lobe { weight: [0.01; 3], alpha: 0.09, f0: 0.6 },
+                Lobe {
+                    weight: [0.05, 0.06, 0.07],
+                    alpha: 0.4,
+                    f0: 0.3,
+                },
+                Lobe {
+                    weight: [0.01; 3],
+                    alpha: 0.09,
+                    f0: 0.6,
+                },
             ],
             color_table: ColorTable::new(rows, columns, nodes.collect(), overall).expect("fits"),
             flakes: None,
@@ -308,7 +364,11 @@ mod tests {
     #[test]
     fn drawn_directions_have_their_stated_density() {
         for roughness in [0.0, 0.08] {
-            let paint = paint(Some(Coat { ior: 1.5, roughness, thickness_um: None }));
+            let paint = paint(Some(Coat {
+                ior: 1.5,
+                roughness,
+                thickness_um: None,
+            }));
             let mut kernel = Kernel::new(&paint);
             kernel.draws = true;
             let wo = direction(0.7, 0.0);
@@ -316,7 +376,9 @@ mod tests {
             let points = super::super::points::Points::of_pixel(0, 0, 1 << 16, 5);
             let mut sum = 0.0_f64;
             for k in 0..1 << 16 {
-                let Some(light) = kernel.sample::<true>(&view, 0, points.pair(k, 1)[0], points.pair(k, 0)) else {
+                let Some(light) =
+                    kernel.sample::<true>(&view, 0, points.pair(k, 1)[0], points.pair(k, 0))
+                else {
                     continue;
                 };
                 let light = splat3(light);
@@ -324,7 +386,10 @@ mod tests {
                 sum += f64::from(light[2].0[0] / answer.density.0[0]);
             }
             let projected = sum / f64::from(1 << 16);
-            assert!((projected / std::f64::consts::PI - 1.0).abs() < 0.01, "{roughness}: {projected}");
+            assert!(
+                (projected / std::f64::consts::PI - 1.0).abs() < 0.01,
+                "{roughness}: {projected}"
+            );
         }
     }
 }

@@ -77,13 +77,25 @@ impl Lanes {
 
     #[inline(always)]
     pub(super) fn min(self, other: Self) -> Self {
-        Self(from_fn(|k| if self.0[k] < other.0[k] { self.0[k] } else { other.0[k] }))
+        Self(from_fn(|k| {
+            if self.0[k] < other.0[k] {
+                self.0[k]
+            } else {
+                other.0[k]
+            }
+        }))
     }
 
     /// `self` where `a < b`, `other` elsewhere.
     #[inline(always)]
     pub(super) fn where_less(self, a: Self, b: Self, other: Self) -> Self {
-        Self(from_fn(|k| if a.0[k] < b.0[k] { self.0[k] } else { other.0[k] }))
+        Self(from_fn(|k| {
+            if a.0[k] < b.0[k] {
+                self.0[k]
+            } else {
+                other.0[k]
+            }
+        }))
     }
 
     /// `exp(−x)` for `x ≥ 0` to 4e-7 + 1e-7 x relative (the rounding of x itself), in arithmetic that every machine does alike; 0 beyond 87.
@@ -96,9 +108,16 @@ impl Lanes {
         let y = self.min(Self::splat(87.3)) * -std::f32::consts::LOG2_E;
         let rounded = y + ROUND;
         let t = (y - (rounded - ROUND)) * std::f32::consts::LN_2;
-        let p = ((((t * (1.0 / 720.0) + 1.0 / 120.0) * t + 1.0 / 24.0) * t + 1.0 / 6.0) * t + 0.5) * t * t + t + 1.0;
+        let p = ((((t * (1.0 / 720.0) + 1.0 / 120.0) * t + 1.0 / 24.0) * t + 1.0 / 6.0) * t + 0.5)
+            * t
+            * t
+            + t
+            + 1.0;
         let power = Self(from_fn(|k| {
-            let n = rounded.0[k].to_bits().wrapping_sub(ROUND.to_bits()).wrapping_add(127);
+            let n = rounded.0[k]
+                .to_bits()
+                .wrapping_sub(ROUND.to_bits())
+                .wrapping_add(127);
             f32::from_bits(n << 23)
         }));
         (p * power).where_less(self, Self::splat(87.3), Self::splat(0.0))
@@ -109,8 +128,15 @@ impl Lanes {
     /// `atan` on 0..1 by an odd polynomial of degree 13, fitted here for the least maximal error (2.5e-7 rad).
     #[inline(always)]
     pub(super) fn quadrant_deg(y: Self, x: Self) -> Self {
-        const C: [f32; 7] =
-            [0.999_996_1, -0.333_173_7, 0.198_078_15, -0.132_333_4, 0.079_623_62, -0.033_604_17, 0.006_811_78];
+        const C: [f32; 7] = [
+            0.999_996_1,
+            -0.333_173_7,
+            0.198_078_15,
+            -0.132_333_4,
+            0.079_623_62,
+            -0.033_604_17,
+            0.006_811_78,
+        ];
         let t = y.min(x) / y.max(x).at_least(f32::MIN_POSITIVE);
         let s = t * t;
         let p = (((((s * C[6] + C[5]) * s + C[4]) * s + C[3]) * s + C[2]) * s + C[1]) * s + C[0];
@@ -168,7 +194,10 @@ mod tests {
             let got = f64::from(Lanes::splat(x).exp_of_negative().0[3]);
             let want = (-f64::from(x)).exp();
             let accepted = (4e-7 + 1e-7 * f64::from(x)) * want;
-            assert!((got - want).abs() <= accepted || x > 87.2, "{x}: {got} {want}");
+            assert!(
+                (got - want).abs() <= accepted || x > 87.2,
+                "{x}: {got} {want}"
+            );
         }
         assert_eq!(Lanes::splat(1e30).exp_of_negative().0[0], 0.0);
     }
@@ -178,10 +207,16 @@ mod tests {
         for k in 0..=9000_u16 {
             let want = f64::from(k) * 0.01;
             #[allow(clippy::cast_possible_truncation)]
-            let (y, x) = (want.to_radians().sin() as f32, want.to_radians().cos() as f32);
+            let (y, x) = (
+                want.to_radians().sin() as f32,
+                want.to_radians().cos() as f32,
+            );
             let got = Lanes::quadrant_deg(Lanes::splat(y), Lanes::splat(x)).0[0];
             assert!((f64::from(got) - want).abs() < 5e-5, "{want}: {got}");
         }
-        assert_eq!(Lanes::quadrant_deg(Lanes::splat(0.0), Lanes::splat(0.0)).0[0], 90.0);
+        assert_eq!(
+            Lanes::quadrant_deg(Lanes::splat(0.0), Lanes::splat(0.0)).0[0],
+            90.0
+        );
     }
 }

@@ -40,19 +40,33 @@ impl Grid {
             Source::Uniform(_) => (1, 1),
             Source::Studio(_) => (3, 1),
             Source::Map(map) => {
-                let fine = map.width.div_ceil(WIDTH).max(map.height.div_ceil(HEIGHT)).clamp(1, FINEST);
-                (fine, map.width.div_ceil(WIDTH * fine).max(map.height.div_ceil(HEIGHT * fine)))
+                let fine = map
+                    .width
+                    .div_ceil(WIDTH)
+                    .max(map.height.div_ceil(HEIGHT))
+                    .clamp(1, FINEST);
+                (
+                    fine,
+                    map.width
+                        .div_ceil(WIDTH * fine)
+                        .max(map.height.div_ceil(HEIGHT * fine)),
+                )
             }
         };
         let light = |u: f32, v: f32| match environment.source() {
             Source::Map(map) => luminance(map.at(u, v)),
-            Source::Studio(_) | Source::Uniform(_) => luminance(environment.radiance(Map::direction(u, v))),
+            Source::Studio(_) | Source::Uniform(_) => {
+                luminance(environment.radiance(Map::direction(u, v)))
+            }
         };
         let found: Vec<(f32, f32)> = (0..WIDTH * HEIGHT * fine * fine)
             .into_par_iter()
             .map(|k| {
                 let (cell, part) = (k / (fine * fine), k % (fine * fine));
-                let corner = [cell % WIDTH * fine + part % fine, cell / WIDTH * fine + part / fine];
+                let corner = [
+                    cell % WIDTH * fine + part % fine,
+                    cell / WIDTH * fine + part / fine,
+                ];
                 // The trapezoidal rule at the corners, edges and middle of each pixel: exact for bilinear light.
                 let (mut sum, mut most) = (0.0, 0.0_f32);
                 let last = 2 * dense;
@@ -71,17 +85,31 @@ impl Grid {
         let each = fine * fine;
         let mean = |parts: &[(f32, f32)]| parts.iter().map(|p| p.0).sum::<f32>() / each as f32;
         let cells = found.chunks(each).map(mean).collect();
-        Self { cells, fine, parts: found.into_iter().map(|p| p.1).collect(), bounds: Vec::new() }
+        Self {
+            cells,
+            fine,
+            parts: found.into_iter().map(|p| p.1).collect(),
+            bounds: Vec::new(),
+        }
     }
 
     /// Adds the floor to the parts; the mean luminance of the sphere.
     pub(super) fn raise_floor(&mut self) -> f64 {
-        let mean: f64 = self.cells.iter().enumerate().map(|(k, &light)| f64::from(light) * Self::share(k)).sum();
+        let mean: f64 = self
+            .cells
+            .iter()
+            .enumerate()
+            .map(|(k, &light)| f64::from(light) * Self::share(k))
+            .sum();
         let each = self.fine * self.fine;
         for light in &mut self.parts {
             *light += FLOOR * mean as f32;
         }
-        self.bounds = self.parts.chunks(each).map(|parts| parts.iter().sum::<f32>() / each as f32).collect();
+        self.bounds = self
+            .parts
+            .chunks(each)
+            .map(|parts| parts.iter().sum::<f32>() / each as f32)
+            .collect();
         mean
     }
 
@@ -98,7 +126,10 @@ impl Grid {
 
     pub(super) fn center(cell: usize) -> Vec3 {
         let (x, y) = (cell % WIDTH, cell / WIDTH);
-        Map::direction((x as f32 + 0.5) / WIDTH as f32, (y as f32 + 0.5) / HEIGHT as f32)
+        Map::direction(
+            (x as f32 + 0.5) / WIDTH as f32,
+            (y as f32 + 0.5) / HEIGHT as f32,
+        )
     }
 
     /// Cell and part of a unit direction.
@@ -107,7 +138,10 @@ impl Grid {
         let fine = self.fine;
         let u = (d[0].atan2(-d[2]) / TAU).rem_euclid(1.0) * (WIDTH * fine) as f32;
         let v = d[1].clamp(-1.0, 1.0).acos() / PI * (HEIGHT * fine) as f32;
-        let (x, y) = ((u as usize).min(WIDTH * fine - 1), (v as usize).min(HEIGHT * fine - 1));
+        let (x, y) = (
+            (u as usize).min(WIDTH * fine - 1),
+            (v as usize).min(HEIGHT * fine - 1),
+        );
         let cell = y / fine * WIDTH + x / fine;
         (cell, cell * fine * fine + y % fine * fine + x % fine)
     }
@@ -117,15 +151,27 @@ impl Grid {
         let fine = self.fine;
         let parts = &self.parts[cell * fine * fine..(cell + 1) * fine * fine];
         let rows: [f64; FINEST] = std::array::from_fn(|r| {
-            parts.get(r * fine..(r + 1) * fine).map_or(0.0, |row| row.iter().map(|&v| f64::from(v)).sum())
+            parts
+                .get(r * fine..(r + 1) * fine)
+                .map_or(0.0, |row| row.iter().map(|&v| f64::from(v)).sum())
         });
         let (row, down) = walk(rows[..fine].iter().copied(), down);
-        let (column, across) = walk(parts[row * fine..(row + 1) * fine].iter().map(|&v| f64::from(v)), across);
-        let theta = ((cell / WIDTH) as f64 + (row as f64 + down) / fine as f64) / HEIGHT as f64 * std::f64::consts::PI;
+        let (column, across) = walk(
+            parts[row * fine..(row + 1) * fine]
+                .iter()
+                .map(|&v| f64::from(v)),
+            across,
+        );
+        let theta = ((cell / WIDTH) as f64 + (row as f64 + down) / fine as f64) / HEIGHT as f64
+            * std::f64::consts::PI;
         let turn = ((cell % WIDTH) as f64 + (column as f64 + across) / fine as f64) / WIDTH as f64;
         let (sine, y) = theta.sin_cos();
         let turn = turn * std::f64::consts::TAU;
-        let direction = [(sine * turn.sin()) as f32, y as f32, (-sine * turn.cos()) as f32];
+        let direction = [
+            (sine * turn.sin()) as f32,
+            y as f32,
+            (-sine * turn.cos()) as f32,
+        ];
         (cell * fine * fine + row * fine + column, direction)
     }
 }

@@ -54,7 +54,11 @@ const STRATA: u16 = 32;
 
 /// Cosine at the middle of a facing, widened to what surfaces that are a little turned see.
 fn weight(cosine: f32) -> f32 {
-    if cosine > -0.3 { (cosine + 0.12).max(0.02) } else { 0.0 }
+    if cosine > -0.3 {
+        (cosine + 0.12).max(0.02)
+    } else {
+        0.0
+    }
 }
 
 #[allow(clippy::cast_precision_loss)]
@@ -69,7 +73,11 @@ fn middle_of(facing: usize) -> Vec3 {
     unit(normal)
 }
 
-#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+#[allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss
+)]
 impl<'a> LightTable<'a> {
     /// Prepares an environment; `None` for one without light.
     pub(super) fn new(environment: &'a Environment) -> Option<Self> {
@@ -78,9 +86,16 @@ impl<'a> LightTable<'a> {
         if mean <= 0.0 {
             return None;
         }
-        let cells: Vec<(Vec3, f64)> = (0..WIDTH * HEIGHT).map(|k| (Grid::center(k), Grid::share(k))).collect();
+        let cells: Vec<(Vec3, f64)> = (0..WIDTH * HEIGHT)
+            .map(|k| (Grid::center(k), Grid::share(k)))
+            .collect();
         let facings = (0..6 * EDGE * EDGE).map(|_| OnceLock::new()).collect();
-        Some(Self { environment, grid, cells, facings })
+        Some(Self {
+            environment,
+            grid,
+            cells,
+            facings,
+        })
     }
 
     fn seen_from(&self, facing: usize) -> &Facing {
@@ -91,7 +106,11 @@ impl<'a> LightTable<'a> {
     /// Number of the facing of a unit normal.
     pub(super) fn facing(n: Vec3) -> usize {
         let size = n.map(f32::abs);
-        let axis = if size[0] >= size[1] && size[0] >= size[2] { 0 } else { 2 - usize::from(size[1] >= size[2]) };
+        let axis = if size[0] >= size[1] && size[0] >= size[2] {
+            0
+        } else {
+            2 - usize::from(size[1] >= size[2])
+        };
         let cell = |v: f32| (((v / size[axis] + 1.0) * 0.5 * EDGE as f32) as usize).min(EDGE - 1);
         let face = axis * 2 + usize::from(n[axis] < 0.0);
         (face * EDGE + cell(n[(axis + 2) % 3])) * EDGE + cell(n[(axis + 1) % 3])
@@ -122,7 +141,9 @@ impl Facing {
         let seen: Vec<f32> = cells.iter().map(|(d, _)| weight(dot(*d, normal))).collect();
         let power = |light: &[f32]| -> Vec<f64> {
             let terms = light.iter().zip(&seen).zip(cells);
-            terms.map(|((light, seen), (_, share))| f64::from(light * seen) * share).collect()
+            terms
+                .map(|((light, seen), (_, share))| f64::from(light * seen) * share)
+                .collect()
         };
         let columns: Vec<Search> = power(&grid.bounds).chunks(WIDTH).map(Search::new).collect();
         let rows = Search::new(&columns.iter().map(Search::total).collect::<Vec<_>>());
@@ -145,7 +166,11 @@ impl Facing {
                 let density = grid.parts[part] * seen[cell] * scale_of;
                 drawn += f64::from(luminance(radiance) * seen[cell] / density);
                 crowding += f64::from(density);
-                samples.push(LightSample { direction, density, light: scale(radiance, 1.0 / density) });
+                samples.push(LightSample {
+                    direction,
+                    density,
+                    light: scale(radiance, 1.0 / density),
+                });
             }
         }
         // The set as a whole carries the light of the grid: what few directions miss between them is shared out.
@@ -157,7 +182,12 @@ impl Facing {
             }
         }
         let extent = (samples.len() as f64 / crowding) as f32;
-        Self { normal, scale: scale_of, samples, extent }
+        Self {
+            normal,
+            scale: scale_of,
+            samples,
+            extent,
+        }
     }
 }
 
@@ -173,7 +203,9 @@ impl Search {
             sum += w;
             sum
         };
-        Self { sums: weights.iter().map(&mut step).collect() }
+        Self {
+            sums: weights.iter().map(&mut step).collect(),
+        }
     }
 
     fn total(&self) -> f64 {
@@ -187,7 +219,14 @@ impl Search {
         let bin = self.sums.partition_point(|&s| s <= target).min(last);
         let below = if bin == 0 { 0.0 } else { self.sums[bin - 1] };
         let width = self.sums[bin] - below;
-        (bin, if width > 0.0 { ((target - below) / width).clamp(0.0, 1.0) } else { 0.5 })
+        (
+            bin,
+            if width > 0.0 {
+                ((target - below) / width).clamp(0.0, 1.0)
+            } else {
+                0.5
+            },
+        )
     }
 }
 
@@ -208,25 +247,48 @@ mod tests {
     #[test]
     fn drawn_light_is_the_light_there_is() {
         let (width, height) = (64, 32);
-        let pixels = (0..width * height).map(|k| [if k % width < 16 && k / width < 12 { 30.0 } else { 0.4 }; 3]);
-        let environment = Environment::map(Map { width, height, pixels: pixels.collect() });
+        let pixels = (0..width * height).map(|k| {
+            [if k % width < 16 && k / width < 12 {
+                30.0
+            } else {
+                0.4
+            }; 3]
+        });
+        let environment = Environment::map(Map {
+            width,
+            height,
+            pixels: pixels.collect(),
+        });
         let table = LightTable::new(&environment).expect("light");
-        for normal in [[0.0, 1.0, 0.0], unit([0.5, 0.2, -0.7]), unit([-0.3, -0.8, 0.4])] {
+        for normal in [
+            [0.0, 1.0, 0.0],
+            unit([0.5, 0.2, -0.7]),
+            unit([-0.3, -0.8, 0.4]),
+        ] {
             let samples = &table.seen_from(LightTable::facing(normal)).samples;
             #[allow(clippy::cast_precision_loss)]
-            let drawn: f32 = samples.iter().map(|s| s.light[1] * dot(s.direction, normal).max(0.0)).sum::<f32>()
+            let drawn: f32 = samples
+                .iter()
+                .map(|s| s.light[1] * dot(s.direction, normal).max(0.0))
+                .sum::<f32>()
                 / samples.len() as f32;
             let n = 400_u16;
             let mut summed = 0.0;
             for j in 0..n {
                 for i in 0..2 * n {
-                    let (u, v) = ((f32::from(i) + 0.5) / f32::from(2 * n), (f32::from(j) + 0.5) / f32::from(n));
+                    let (u, v) = (
+                        (f32::from(i) + 0.5) / f32::from(2 * n),
+                        (f32::from(j) + 0.5) / f32::from(n),
+                    );
                     let d = Map::direction(u, v);
                     let solid = (v * PI).sin() * PI / f32::from(n) * TAU / f32::from(2 * n);
                     summed += environment.radiance(d)[1] * dot(d, normal).max(0.0) * solid;
                 }
             }
-            assert!((drawn / summed - 1.0).abs() < 0.01, "{normal:?}: {drawn} against {summed}");
+            assert!(
+                (drawn / summed - 1.0).abs() < 0.01,
+                "{normal:?}: {drawn} against {summed}"
+            );
         }
     }
 

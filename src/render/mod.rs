@@ -89,7 +89,11 @@ pub struct Rendering {
 /// # Errors
 ///
 /// [`RenderError::Scene`] for a scene that is out of range.
-pub fn render(paint: &CarPaint, scene: &Scene, progress: &(dyn Fn(f32) + Sync)) -> Result<Rendering, RenderError> {
+pub fn render(
+    paint: &CarPaint,
+    scene: &Scene,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Rendering, RenderError> {
     scene.validate(&Limits::default())?;
     let (shader, plan) = shade::Shader::new(paint, scene);
     let [width, height] = scene.size;
@@ -105,7 +109,11 @@ pub fn render(paint: &CarPaint, scene: &Scene, progress: &(dyn Fn(f32) + Sync)) 
         })
         .collect();
     let film = Film::new(width, height, scene.exposure, rows.concat());
-    let report = RenderReport { plan, samples_per_pixel: scene.samples_per_pixel, pixel_mm: pixel_mm(scene) };
+    let report = RenderReport {
+        plan,
+        samples_per_pixel: scene.samples_per_pixel,
+        pixel_mm: pixel_mm(scene),
+    };
     Ok(Rendering { film, report })
 }
 
@@ -123,7 +131,13 @@ mod tests {
     use crate::paint::{AngleGrid, Coat, ColorTable, FlakeTexture, Flakes, Lobe};
 
     fn solid(diffuse: f64, coat: Option<Coat>) -> CarPaint {
-        CarPaint { coat, diffuse: [diffuse; 3], lobes: Vec::new(), color_table: ColorTable::white(), flakes: None }
+        CarPaint {
+            coat,
+            diffuse: [diffuse; 3],
+            lobes: Vec::new(),
+            color_table: ColorTable::white(),
+            flakes: None,
+        }
     }
 
     /// One slice: nineteen dark texels to one bright one.
@@ -135,14 +149,30 @@ mod tests {
             probability: vec![0.95, 0.05],
             lower: vec![[5.0, 0.0, 0.0], [120.0, 0.0, 0.0]],
             upper: vec![[9.0, 0.0, 0.0], [160.0, 0.0, 0.0]],
-            texture: FlakeTexture { texel_um: 20.0, grain_um: 12.0, lifetime_deg: [3.0; 2], persistence_deg: [6.0; 2] },
+            texture: FlakeTexture {
+                texel_um: 20.0,
+                grain_um: 12.0,
+                lifetime_deg: [3.0; 2],
+                persistence_deg: [6.0; 2],
+            },
         };
-        let lobes = vec![Lobe { weight: [0.05; 3], alpha: 0.3, f0: 0.5 }];
-        CarPaint { lobes, flakes: Some(flakes), ..solid(0.05, Some(Coat::smooth(1.5))) }
+        let lobes = vec![Lobe {
+            weight: [0.05; 3],
+            alpha: 0.3,
+            f0: 0.5,
+        }];
+        CarPaint {
+            lobes,
+            flakes: Some(flakes),
+            ..solid(0.05, Some(Coat::smooth(1.5)))
+        }
     }
 
     fn scene(size: u32, samples: u32) -> Scene {
-        Scene { samples_per_pixel: samples, ..Scene::new(Shape::Sphere, [size, size]) }
+        Scene {
+            samples_per_pixel: samples,
+            ..Scene::new(Shape::Sphere, [size, size])
+        }
     }
 
     fn film(paint: &CarPaint, scene: &Scene) -> Film {
@@ -166,8 +196,11 @@ mod tests {
 
     #[test]
     fn a_white_furnace_gives_a_diffuse_paint_its_albedo() {
-        let furnace = Scene { background: Background::Environment, ..scene(16, 64) }
-            .in_environment(Environment::uniform([1.0; 3]));
+        let furnace = Scene {
+            background: Background::Environment,
+            ..scene(16, 64)
+        }
+        .in_environment(Environment::uniform([1.0; 3]));
         for pixel in film(&solid(0.6, None), &furnace).pixels() {
             // Pixels are object, surroundings, or a mixture.
             assert!((0.6 - 0.012..=1.0 + 1e-4).contains(&pixel[0]), "{pixel:?}");
@@ -180,7 +213,11 @@ mod tests {
     fn under_a_coat_a_furnace_gives_no_more_than_it_got() {
         let furnace = scene(16, 256).in_environment(Environment::uniform([1.0; 3]));
         for roughness in [0.0, 0.05] {
-            let coat = Coat { ior: 1.5, roughness, thickness_um: None };
+            let coat = Coat {
+                ior: 1.5,
+                roughness,
+                thickness_um: None,
+            };
             for pixel in film(&solid(0.9, Some(coat)), &furnace).pixels() {
                 assert!((0.5..=1.02).contains(&pixel[1]), "{roughness}: {pixel:?}");
             }
@@ -192,9 +229,25 @@ mod tests {
     fn a_narrow_highlight_carries_the_light_of_the_mirror_image() {
         let furnace = scene(8, 256).in_environment(Environment::uniform([1.0; 3]));
         let light = |roughness| {
-            film(&solid(0.0, Some(Coat { ior: 1.5, roughness, thickness_um: None })), &furnace).pixels()[4 * 8 + 4][0]
+            film(
+                &solid(
+                    0.0,
+                    Some(Coat {
+                        ior: 1.5,
+                        roughness,
+                        thickness_um: None,
+                    }),
+                ),
+                &furnace,
+            )
+            .pixels()[4 * 8 + 4][0]
         };
-        assert!((light(0.004) / light(0.0) - 1.0).abs() < 0.02, "{} {}", light(0.004), light(0.0));
+        assert!(
+            (light(0.004) / light(0.0) - 1.0).abs() < 0.02,
+            "{} {}",
+            light(0.004),
+            light(0.0)
+        );
     }
 
     #[test]
@@ -202,7 +255,10 @@ mod tests {
         let (paint, scene) = (sparkling(), scene(40, 8));
         let pictures: Vec<Vec<u8>> = [1, 2, 8]
             .map(|threads| {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+                let pool = rayon::ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .build()
+                    .expect("threads");
                 pool.install(|| film(&paint, &scene).to_exr().expect("encodes"))
             })
             .into();
@@ -212,7 +268,10 @@ mod tests {
 
     #[test]
     fn a_solid_color_does_not_sparkle_and_a_metallic_does() {
-        let scene = Scene { object_mm: 8.0, ..scene(96, 64) };
+        let scene = Scene {
+            object_mm: 8.0,
+            ..scene(96, 64)
+        };
         let calm = texture_of(&film(&solid(0.8, Some(Coat::smooth(1.5))), &scene), 20);
         let lively = texture_of(&film(&sparkling(), &scene), 20);
         assert!(calm < 0.015, "{calm}");
@@ -223,8 +282,10 @@ mod tests {
     fn flakes_add_their_mean_however_few_samples_see_them() {
         let mean = |samples| {
             let film = film(&sparkling(), &scene(48, samples));
-            let middle: Vec<f32> =
-                (14..34).flat_map(|y| (14..34).map(move |x| y * 48 + x)).map(|k| film.pixels()[k][1]).collect();
+            let middle: Vec<f32> = (14..34)
+                .flat_map(|y| (14..34).map(move |x| y * 48 + x))
+                .map(|k| film.pixels()[k][1])
+                .collect();
             #[allow(clippy::cast_precision_loss)]
             let mean = middle.iter().sum::<f32>() / middle.len() as f32;
             mean
@@ -236,19 +297,29 @@ mod tests {
     #[test]
     fn every_pixel_of_every_shape_is_finite_and_no_light_is_negative() {
         for shape in [Shape::Sphere, Shape::Capsule, Shape::Panel] {
-            let scene = Scene { samples_per_pixel: 4, ..Scene::new(shape, [50, 34]) };
+            let scene = Scene {
+                samples_per_pixel: 4,
+                ..Scene::new(shape, [50, 34])
+            };
             for pixel in film(&sparkling(), &scene).pixels() {
-                assert!(pixel.iter().all(|v| v.is_finite() && *v >= 0.0), "{shape:?}: {pixel:?}");
+                assert!(
+                    pixel.iter().all(|v| v.is_finite() && *v >= 0.0),
+                    "{shape:?}: {pixel:?}"
+                );
             }
         }
     }
 
     #[test]
     fn the_report_says_what_was_left_out() {
-        let report = render(&solid(0.5, None), &scene(8, 1), &|_| {}).expect("valid").report;
+        let report = render(&solid(0.5, None), &scene(8, 1), &|_| {})
+            .expect("valid")
+            .report;
         assert!(!report.plan.has(Effect::Flakes) && !report.plan.has(Effect::Coat));
         assert!(report.plan.has(Effect::Environment));
-        let report = render(&sparkling(), &scene(8, 1), &|_| {}).expect("valid").report;
+        let report = render(&sparkling(), &scene(8, 1), &|_| {})
+            .expect("valid")
+            .report;
         assert!(report.plan.has(Effect::Flakes) && report.plan.has(Effect::MirrorImage));
     }
 
@@ -260,16 +331,42 @@ mod tests {
         };
         assert_eq!(refused(scene(0, 1)), "size");
         assert_eq!(refused(scene(8, 0)), "samples_per_pixel");
-        assert_eq!(refused(Scene { exposure: f32::NAN, ..scene(8, 1) }), "exposure");
-        assert_eq!(refused(Scene { object_mm: 0.0, ..scene(8, 1) }), "object_mm");
-        let dark = DirectionalLight { towards: [0.0; 3], irradiance: [1.0; 3] };
-        assert_eq!(refused(Scene { lights: vec![dark], ..scene(8, 1) }), "lights.towards");
+        assert_eq!(
+            refused(Scene {
+                exposure: f32::NAN,
+                ..scene(8, 1)
+            }),
+            "exposure"
+        );
+        assert_eq!(
+            refused(Scene {
+                object_mm: 0.0,
+                ..scene(8, 1)
+            }),
+            "object_mm"
+        );
+        let dark = DirectionalLight {
+            towards: [0.0; 3],
+            irradiance: [1.0; 3],
+        };
+        assert_eq!(
+            refused(Scene {
+                lights: vec![dark],
+                ..scene(8, 1)
+            }),
+            "lights.towards"
+        );
     }
 
     #[test]
     fn no_light_at_all_is_black_not_an_error() {
         let night = scene(12, 2).in_environment(Environment::uniform([0.0; 3]));
-        assert!(film(&sparkling(), &night).pixels().iter().all(|p| *p == [0.0; 3]));
+        assert!(
+            film(&sparkling(), &night)
+                .pixels()
+                .iter()
+                .all(|p| *p == [0.0; 3])
+        );
     }
 
     #[test]
@@ -293,7 +390,10 @@ mod tests {
         #[allow(clippy::cast_precision_loss)]
         let mean = pixels.iter().map(|p| f64::from(p[1])).sum::<f64>() / pixels.len() as f64;
         assert!((mean / want - 1.0).abs() < 0.15, "{mean} {want}");
-        assert!(matches!(texels(&solid(0.5, None), 0.0, 0.0, [8, 8], 3, &limits), Err(RenderError::NoFlakes)));
+        assert!(matches!(
+            texels(&solid(0.5, None), 0.0, 0.0, [8, 8], 3, &limits),
+            Err(RenderError::NoFlakes)
+        ));
         assert!(texels(&sparkling(), 91.0, 0.0, [8, 8], 3, &limits).is_err());
     }
 }

@@ -27,8 +27,14 @@ pub(super) struct CoatKernel {
 }
 
 impl CoatKernel {
-    pub(super) const ABSENT: Self =
-        Self { ior: 1.0, inverse_ior: 1.0, excess: 0.0, alpha2: 0.0, share: 0.0, mirror: true };
+    pub(super) const ABSENT: Self = Self {
+        ior: 1.0,
+        inverse_ior: 1.0,
+        excess: 0.0,
+        alpha2: 0.0,
+        share: 0.0,
+        mirror: true,
+    };
 
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn new(coat: &Coat) -> Self {
@@ -38,7 +44,14 @@ impl CoatKernel {
         let (ior, roughness, mirror) = (coat.ior as f32, coat.roughness as f32, coat.is_mirror());
         let share = if mirror { 0.0 } else { 0.7 };
         let excess = ((coat.ior - 1.0) * (coat.ior + 1.0)) as f32;
-        Self { ior, inverse_ior: 1.0 / ior, excess, alpha2: roughness * roughness, share, mirror }
+        Self {
+            ior,
+            inverse_ior: 1.0 / ior,
+            excess,
+            alpha2: roughness * roughness,
+            share,
+            mirror,
+        }
     }
 
     #[inline(always)]

@@ -20,7 +20,10 @@ impl Points {
     /// The `count` points of a pixel; `index` below stays below it.
     pub(super) fn of_pixel(x: u32, y: u32, count: u32, seed: u32) -> Self {
         let run = count.next_power_of_two();
-        Self { first: (spread(x) | (spread(y) << 1)).wrapping_mul(run), seed: hash(seed) }
+        Self {
+            first: (spread(x) | (spread(y) << 1)).wrapping_mul(run),
+            seed: hash(seed),
+        }
     }
 
     /// Point `index` of the pair of dimensions `pair`, in `0..1` each.
@@ -31,11 +34,18 @@ impl Points {
     /// Draw `draw` of `draws` for point `index`; all draws of all points together are evenly spread.
     pub(super) fn one_of(self, draw: u32, draws: u32, index: u32, pair: u32) -> [f32; 2] {
         let seed = hash(self.seed ^ pair.wrapping_mul(0x9e37_79b9));
-        let index = self.first.wrapping_add(index).wrapping_mul(draws).wrapping_add(draw);
+        let index = self
+            .first
+            .wrapping_add(index)
+            .wrapping_mul(draws)
+            .wrapping_add(draw);
         let shuffled = scramble(index, seed);
         let x = shuffled.reverse_bits();
         let y = second_dimension(shuffled);
-        [to_unit(scramble(x, seed ^ 0x5bd1_e995)), to_unit(scramble(y, seed ^ 0xb529_7a4d))]
+        [
+            to_unit(scramble(x, seed ^ 0x5bd1_e995)),
+            to_unit(scramble(y, seed ^ 0xb529_7a4d)),
+        ]
     }
 }
 
@@ -86,7 +96,11 @@ fn to_unit(x: u32) -> f32 {
 mod tests {
     use super::*;
 
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss
+    )]
     fn evenly_spread(points: &[[f32; 2]]) -> bool {
         let n = points.len();
         (0..=n.ilog2()).all(|k| {
@@ -102,7 +116,9 @@ mod tests {
     #[test]
     fn every_elementary_interval_gets_one_point() {
         for x in 0..20 {
-            let points: Vec<_> = (0..64).map(|k| Points::of_pixel(x, 7, 64, 1).pair(k, 3)).collect();
+            let points: Vec<_> = (0..64)
+                .map(|k| Points::of_pixel(x, 7, 64, 1).pair(k, 3))
+                .collect();
             assert!(evenly_spread(&points), "pixel {x}");
         }
     }
@@ -110,8 +126,9 @@ mod tests {
     #[test]
     fn neighbouring_pixels_complete_each_other() {
         let block = (0..16).map(|k| (8 + k % 4, 4 + k / 4));
-        let points: Vec<_> =
-            block.flat_map(|(x, y)| (0..16).map(move |k| Points::of_pixel(x, y, 16, 9).pair(k, 1))).collect();
+        let points: Vec<_> = block
+            .flat_map(|(x, y)| (0..16).map(move |k| Points::of_pixel(x, y, 16, 9).pair(k, 1)))
+            .collect();
         assert!(evenly_spread(&points));
     }
 

@@ -92,7 +92,11 @@ impl Scene {
     #[must_use]
     pub fn in_environment(mut self, environment: Environment) -> Self {
         let level = environment.level();
-        self.exposure = if level > 0.0 && level.is_finite() { 0.8 / level } else { 1.0 };
+        self.exposure = if level > 0.0 && level.is_finite() {
+            0.8 / level
+        } else {
+            1.0
+        };
         self.environment = environment;
         self.background = Background::Environment;
         self.lights.clear();
@@ -105,36 +109,65 @@ impl Scene {
     ///
     /// [`RenderError::Scene`] names the first field that is out of range.
     pub fn validate(&self, limits: &Limits) -> Result<(), RenderError> {
-        let refuse = |field: &'static str, reason: String| Err(RenderError::Scene { field, reason });
+        let refuse =
+            |field: &'static str, reason: String| Err(RenderError::Scene { field, reason });
         let [width, height] = self.size;
         if width == 0 || height == 0 || u64::from(width) * u64::from(height) > limits.pixels {
-            return refuse("size", format!("{width} x {height}, accepted are 1 to {} pixels", limits.pixels));
+            return refuse(
+                "size",
+                format!(
+                    "{width} x {height}, accepted are 1 to {} pixels",
+                    limits.pixels
+                ),
+            );
         }
         if !(1..=limits.samples).contains(&self.samples_per_pixel) {
-            let reason = format!("{}, accepted is 1 to {}", self.samples_per_pixel, limits.samples);
+            let reason = format!(
+                "{}, accepted is 1 to {}",
+                self.samples_per_pixel, limits.samples
+            );
             return refuse("samples_per_pixel", reason);
         }
         if !(0.1..=1e5).contains(&self.object_mm) {
-            return refuse("object_mm", format!("{}, accepted is 0.1 to 100000", self.object_mm));
+            return refuse(
+                "object_mm",
+                format!("{}, accepted is 0.1 to 100000", self.object_mm),
+            );
         }
         if !(self.exposure > 0.0 && self.exposure.is_finite()) {
-            return refuse("exposure", format!("{}, accepted is above 0", self.exposure));
+            return refuse(
+                "exposure",
+                format!("{}, accepted is above 0", self.exposure),
+            );
         }
         for light in &self.lights {
             let length2: f32 = light.towards.iter().map(|v| v * v).sum();
             if !(length2 > 0.0 && length2.is_finite()) {
-                return refuse("lights.towards", format!("{:?} is no direction", light.towards));
+                return refuse(
+                    "lights.towards",
+                    format!("{:?} is no direction", light.towards),
+                );
             }
             if !light.irradiance.iter().all(|v| (0.0..=65504.0).contains(v)) {
-                return refuse("lights.irradiance", format!("{:?}, accepted is 0 to 65504", light.irradiance));
+                return refuse(
+                    "lights.irradiance",
+                    format!("{:?}, accepted is 0 to 65504", light.irradiance),
+                );
             }
         }
-        let Camera { origin, target, field_of_view_deg } = self.camera;
+        let Camera {
+            origin,
+            target,
+            field_of_view_deg,
+        } = self.camera;
         if !origin.iter().chain(&target).all(|v| v.is_finite()) || origin == target {
             return refuse("camera", format!("looks from {origin:?} to {target:?}"));
         }
         if !(0.1..=170.0).contains(&field_of_view_deg) {
-            return refuse("camera.field_of_view_deg", format!("{field_of_view_deg}, accepted is 0.1 to 170"));
+            return refuse(
+                "camera.field_of_view_deg",
+                format!("{field_of_view_deg}, accepted is 0.1 to 170"),
+            );
         }
         Ok(())
     }
@@ -145,8 +178,14 @@ impl DirectionalLight {
     #[must_use]
     pub const fn key(shape: Shape) -> Self {
         match shape {
-            Shape::Sphere | Shape::Capsule => Self { towards: [-0.35, 0.75, 0.70], irradiance: [0.75; 3] },
-            Shape::Panel => Self { towards: [-0.85, 0.60, 0.45], irradiance: [0.60; 3] },
+            Shape::Sphere | Shape::Capsule => Self {
+                towards: [-0.35, 0.75, 0.70],
+                irradiance: [0.75; 3],
+            },
+            Shape::Panel => Self {
+                towards: [-0.85, 0.60, 0.45],
+                irradiance: [0.60; 3],
+            },
         }
     }
 }
@@ -156,9 +195,21 @@ impl Camera {
     #[must_use]
     pub const fn of(shape: Shape) -> Self {
         match shape {
-            Shape::Sphere => Self { origin: [0.0, 1.35, 7.0], target: [0.0, -0.10, 0.0], field_of_view_deg: 20.5 },
-            Shape::Capsule => Self { origin: [-0.7, 1.9, 6.6], target: [0.0, -0.50, 0.0], field_of_view_deg: 18.0 },
-            Shape::Panel => Self { origin: [-0.55, 0.55, 3.9], target: [0.0, -0.40, 0.0], field_of_view_deg: 33.0 },
+            Shape::Sphere => Self {
+                origin: [0.0, 1.35, 7.0],
+                target: [0.0, -0.10, 0.0],
+                field_of_view_deg: 20.5,
+            },
+            Shape::Capsule => Self {
+                origin: [-0.7, 1.9, 6.6],
+                target: [0.0, -0.50, 0.0],
+                field_of_view_deg: 18.0,
+            },
+            Shape::Panel => Self {
+                origin: [-0.55, 0.55, 3.9],
+                target: [0.0, -0.40, 0.0],
+                field_of_view_deg: 33.0,
+            },
         }
     }
 }

@@ -55,7 +55,11 @@ struct Batch {
 impl Batch {
     fn new() -> Self {
         let zero = splat3([0.0; 3]);
-        let (x, y, z) = (splat3([1.0, 0.0, 0.0]), splat3([0.0, 1.0, 0.0]), splat3([0.0, 0.0, 1.0]));
+        let (x, y, z) = (
+            splat3([1.0, 0.0, 0.0]),
+            splat3([0.0, 1.0, 0.0]),
+            splat3([0.0, 0.0, 1.0]),
+        );
         Self {
             count: 0,
             index: [0; WIDTH],
@@ -84,7 +88,11 @@ impl Batch {
 
     /// World directions in the frames of the points.
     fn local(&self, w: Lanes3) -> Lanes3 {
-        [lanes::dot(w, self.tangent), lanes::dot(w, self.side), lanes::dot(w, self.normal)]
+        [
+            lanes::dot(w, self.tangent),
+            lanes::dot(w, self.side),
+            lanes::dot(w, self.normal),
+        ]
     }
 
     /// World direction of a direction in the frame of one point.
@@ -112,7 +120,11 @@ impl<'a> Shader<'a> {
             let tile = RandomTexture::of(t);
             #[allow(clippy::cast_possible_truncation)]
             let cell = cell_spacing(t.grain_um / t.texel_um).max(1.0) as f32;
-            Texture { tile, texels_per_unit, cell }
+            Texture {
+                tile,
+                texels_per_unit,
+                cell,
+            }
         });
         // Turning a light by an angle turns the half vector by half of it.
         #[allow(clippy::cast_possible_truncation)]
@@ -126,7 +138,11 @@ impl<'a> Shader<'a> {
             kernel: Kernel::new(paint),
             ground: Ground::new(&surface),
             surface,
-            lights: scene.lights.iter().map(|light| (unit(light.towards), light.irradiance)).collect(),
+            lights: scene
+                .lights
+                .iter()
+                .map(|light| (unit(light.towards), light.irradiance))
+                .collect(),
             light_table,
             texture,
             lens: Lens::new(scene),
@@ -155,7 +171,12 @@ impl<'a> Shader<'a> {
             let (direction, place) = self.lens.ray(x, y, points.pair(index, 0));
             match self.surface.meet(origin, direction) {
                 Some(hit) => {
-                    batch.push(index, hit, scale(direction, -1.0), self.cell::<FLAKES>(&hit));
+                    batch.push(
+                        index,
+                        hit,
+                        scale(direction, -1.0),
+                        self.cell::<FLAKES>(&hit),
+                    );
                     if batch.count == WIDTH {
                         sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points));
                         batch.count = 0;
@@ -183,18 +204,29 @@ impl<'a> Shader<'a> {
     }
 
     /// Light that leaves the points of a batch, summed.
-    fn leaving<const COATED: bool, const FLAKES: bool>(&self, batch: &Batch, points: Points) -> Vec3 {
+    fn leaving<const COATED: bool, const FLAKES: bool>(
+        &self,
+        batch: &Batch,
+        points: Points,
+    ) -> Vec3 {
         let view = self.kernel.view::<COATED>(batch.local(batch.eye));
-        let texels = if FLAKES { self.texels_seen(batch, &view) } else { Lanes::splat(1.0) };
-        let mut sum = [Lanes::splat(0.0); 3];
-        let mut shine = |light: Lanes3, power: Lanes3, drawn: Option<Lanes>, contrast: Option<Lanes>| {
-            let answer = self.kernel.evaluate::<COATED, FLAKES>(&view, light, &batch.cells, contrast);
-            let mut weight = light[2].at_least(0.0);
-            if let Some(density) = drawn {
-                weight = weight / (density + answer.density);
-            }
-            sum = std::array::from_fn(|k| sum[k] + answer.f[k] * power[k] * weight);
+        let texels = if FLAKES {
+            self.texels_seen(batch, &view)
+        } else {
+            Lanes::splat(1.0)
         };
+        let mut sum = [Lanes::splat(0.0); 3];
+        let mut shine =
+            |light: Lanes3, power: Lanes3, drawn: Option<Lanes>, contrast: Option<Lanes>| {
+                let answer =
+                    self.kernel
+                        .evaluate::<COATED, FLAKES>(&view, light, &batch.cells, contrast);
+                let mut weight = light[2].at_least(0.0);
+                if let Some(density) = drawn {
+                    weight = weight / (density + answer.density);
+                }
+                sum = std::array::from_fn(|k| sum[k] + answer.f[k] * power[k] * weight);
+            };
         let lone = self.contrast(texels);
         for &(towards, irradiance) in &self.lights {
             let light = batch.local(splat3(towards));
@@ -206,14 +238,17 @@ impl<'a> Shader<'a> {
             let count = lights(FLAKES);
             #[allow(clippy::cast_precision_loss)] // a few
             let count_f = count as f32;
-            let facing: [usize; WIDTH] = std::array::from_fn(|k| LightTable::facing(get(&batch.normal, k)));
+            let facing: [usize; WIDTH] =
+                std::array::from_fn(|k| LightTable::facing(get(&batch.normal, k)));
             // One of the directions carries the flakes' deviations for all of them; the others see the mean.
             let many = FLAKES.then(|| {
                 let extent = Lanes(facing.map(|k| table.extent(k)));
                 self.contrast(texels * (extent * self.flakes_per_sr).at_least(1.0))
             });
             for draw in 0..count {
-                let contrast = many.filter(|_| draw == 0).map(|contrast| contrast * count_f);
+                let contrast = many
+                    .filter(|_| draw == 0)
+                    .map(|contrast| contrast * count_f);
                 let (mut directions, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
                 let mut density = Lanes::splat(1.0);
                 for (k, &facing) in facing.iter().enumerate() {
@@ -224,16 +259,29 @@ impl<'a> Shader<'a> {
                 }
                 let light = batch.local(directions);
                 if self.kernel.draws {
-                    shine(light, times(power, density), Some(density * count_f), contrast);
+                    shine(
+                        light,
+                        times(power, density),
+                        Some(density * count_f),
+                        contrast,
+                    );
                 } else {
-                    shine(light, times(power, Lanes::splat(1.0 / count_f)), None, contrast);
+                    shine(
+                        light,
+                        times(power, Lanes::splat(1.0 / count_f)),
+                        None,
+                        contrast,
+                    );
                 }
             }
             if self.kernel.draws {
                 let (mut light, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
                 let mut density = Lanes::splat(1.0);
                 for (k, &facing) in facing.iter().enumerate().take(batch.count) {
-                    let (pick, place) = (points.pair(batch.index[k], 3)[0], points.pair(batch.index[k], 2));
+                    let (pick, place) = (
+                        points.pair(batch.index[k], 3)[0],
+                        points.pair(batch.index[k], 2),
+                    );
                     if let Some(drawn) = self.kernel.sample::<COATED>(&view, k, pick, place) {
                         let direction = batch.world(k, drawn);
                         set(&mut light, k, drawn);
@@ -245,12 +293,24 @@ impl<'a> Shader<'a> {
             }
         }
         let mut light = [0.0; 3];
-        let mirror = if COATED { self.kernel.mirror(&view) } else { Lanes::splat(0.0) };
+        let mirror = if COATED {
+            self.kernel.mirror(&view)
+        } else {
+            Lanes::splat(0.0)
+        };
         for k in 0..batch.count {
             light = add(light, get(&sum, k));
             if COATED && mirror.0[k] > 0.0 {
-                let direction = along(scale(get(&batch.normal, k), 2.0 * view.outer[2].0[k]), get(&batch.eye, k), -1.0);
-                light = along(light, self.around(get(&batch.point, k), direction), mirror.0[k]);
+                let direction = along(
+                    scale(get(&batch.normal, k), 2.0 * view.outer[2].0[k]),
+                    get(&batch.eye, k),
+                    -1.0,
+                );
+                light = along(
+                    light,
+                    self.around(get(&batch.point, k), direction),
+                    mirror.0[k],
+                );
             }
         }
         light
@@ -258,7 +318,9 @@ impl<'a> Shader<'a> {
 
     /// Independent texels under a pixel: its footprint on the paint over the size of a cell.
     fn texels_seen(&self, batch: &Batch, view: &View) -> Lanes {
-        let Some(texture) = &self.texture else { return Lanes::splat(1.0) };
+        let Some(texture) = &self.texture else {
+            return Lanes::splat(1.0);
+        };
         let side = self.lens.pixel_size * texture.texels_per_unit / texture.cell;
         batch.distance * batch.distance * (side * side) / view.outer[2].at_least(0.05)
     }
@@ -271,13 +333,18 @@ impl<'a> Shader<'a> {
     #[allow(clippy::cast_precision_loss)] // a few thousand
     fn contrast(&self, independent: Lanes) -> Lanes {
         let drawn = self.scene.samples_per_pixel as f32;
-        (Lanes::splat(drawn) / independent.at_least(1.0)).min(Lanes::splat(1.0)).sqrt()
+        (Lanes::splat(drawn) / independent.at_least(1.0))
+            .min(Lanes::splat(1.0))
+            .sqrt()
     }
 
     /// What a mirror on the object sees.
     fn around(&self, point: Vec3, direction: Vec3) -> Vec3 {
         let radiance = self.scene.environment.radiance(direction);
-        if let (Source::Studio(_), Some([x, z])) = (self.scene.environment.source(), Ground::meet(point, direction)) {
+        if let (Source::Studio(_), Some([x, z])) = (
+            self.scene.environment.source(),
+            Ground::meet(point, direction),
+        ) {
             let shade = 1.0 - 0.9 * self.ground.occlusion(x, z);
             // The floor's own radiance near the object, the studio's far from it.
             return scale(radiance, shade);
@@ -290,7 +357,8 @@ impl<'a> Shader<'a> {
         if self.scene.background == Background::Environment {
             return self.scene.environment.radiance(direction);
         }
-        let shade = Ground::meet(origin, direction).map_or(0.0, |[x, z]| self.ground.occlusion(x, z));
+        let shade =
+            Ground::meet(origin, direction).map_or(0.0, |[x, z]| self.ground.occlusion(x, z));
         sweep(place, shade)
     }
 }

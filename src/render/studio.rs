@@ -57,7 +57,14 @@ impl Studio {
     }
 }
 
-fn soft_box(center: Vec3, roll_deg: f32, half: [f32; 2], border: f32, radiance: f32, falloff: f32) -> SoftBox {
+fn soft_box(
+    center: Vec3,
+    roll_deg: f32,
+    half: [f32; 2],
+    border: f32,
+    radiance: f32,
+    falloff: f32,
+) -> SoftBox {
     let center = unit(center);
     let level = unit(cross([0.0, 1.0, 0.001], center));
     let steep = cross(center, level);
@@ -65,7 +72,16 @@ fn soft_box(center: Vec3, roll_deg: f32, half: [f32; 2], border: f32, radiance: 
     let across = std::array::from_fn(|k| level[k] * c + steep[k] * s);
     let corner = [half[0] + border, half[1] + border];
     let reach = 1.0 / (1.0 + corner[0] * corner[0] + corner[1] * corner[1]).sqrt();
-    SoftBox { center, across, upwards: cross(center, across), half, border, radiance, falloff, reach }
+    SoftBox {
+        center,
+        across,
+        upwards: cross(center, across),
+        half,
+        border,
+        radiance,
+        falloff,
+        reach,
+    }
 }
 
 impl SoftBox {
@@ -79,7 +95,10 @@ impl SoftBox {
         let (x, y) = (dot(place, self.across), dot(place, self.upwards));
         let edge = |p: f32, half: f32| smoothstep(-self.border, self.border, half - p.abs());
         let cover = edge(x, self.half[0]) * edge(y, self.half[1]);
-        let out = (x / self.half[0]).powi(2).max((y / self.half[1]).powi(2)).min(1.0);
+        let out = (x / self.half[0])
+            .powi(2)
+            .max((y / self.half[1]).powi(2))
+            .min(1.0);
         (cover, self.radiance * (1.0 - self.falloff * out))
     }
 }

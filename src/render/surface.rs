@@ -34,8 +34,20 @@ pub(super) struct Hit {
 #[derive(Clone, Debug)]
 pub(super) enum Surface {
     Sphere,
-    Capsule { axis: Vec3, half: f32, radius: f32, center: Vec3 },
-    Panel { center: Vec3, right: Vec3, up: Vec3, normal: Vec3, half: [f32; 2], corner: f32 },
+    Capsule {
+        axis: Vec3,
+        half: f32,
+        radius: f32,
+        center: Vec3,
+    },
+    Panel {
+        center: Vec3,
+        right: Vec3,
+        up: Vec3,
+        normal: Vec3,
+        half: [f32; 2],
+        corner: f32,
+    },
 }
 
 /// Width of the rounded edge of a panel, world units.
@@ -47,7 +59,12 @@ impl Surface {
             Shape::Sphere => Self::Sphere,
             Shape::Capsule => {
                 let (radius, axis) = (0.48, unit([1.0, 0.0, -0.16]));
-                Self::Capsule { axis, half: 1.0 - radius, radius, center: [0.0, radius - 1.0, 0.0] }
+                Self::Capsule {
+                    axis,
+                    half: 1.0 - radius,
+                    radius,
+                    center: [0.0, radius - 1.0, 0.0],
+                }
             }
             Shape::Panel => {
                 let lean = 30.0_f32.to_radians();
@@ -56,7 +73,14 @@ impl Surface {
                 let up = unit(along(up, back, -lean.sin()));
                 let half = [0.98, 0.72];
                 let center = [0.0, half[1] * up[1] - 1.0, 0.0];
-                Self::Panel { center, right, up, normal: cross(right, up), half, corner: 0.07 }
+                Self::Panel {
+                    center,
+                    right,
+                    up,
+                    normal: cross(right, up),
+                    half,
+                    corner: 0.07,
+                }
             }
         }
     }
@@ -67,16 +91,36 @@ impl Surface {
             Self::Sphere => {
                 let distance = sphere([0.0; 3], 1.0, origin, direction)?;
                 let point = along(origin, direction, distance);
-                Some(Hit { distance, point, normal: unit(point) })
+                Some(Hit {
+                    distance,
+                    point,
+                    normal: unit(point),
+                })
             }
-            Self::Capsule { axis, half, radius, center } => {
+            Self::Capsule {
+                axis,
+                half,
+                radius,
+                center,
+            } => {
                 let distance = capsule(axis, half, radius, sub(origin, center), direction)?;
                 let point = along(origin, direction, distance);
                 let inside = sub(point, center);
                 let foot = dot(inside, axis).clamp(-half, half);
-                Some(Hit { distance, point, normal: unit(along(inside, axis, -foot)) })
+                Some(Hit {
+                    distance,
+                    point,
+                    normal: unit(along(inside, axis, -foot)),
+                })
             }
-            Self::Panel { center, right, up, normal, half, corner } => {
+            Self::Panel {
+                center,
+                right,
+                up,
+                normal,
+                half,
+                corner,
+            } => {
                 let facing = -dot(direction, normal);
                 if facing.abs() < 1e-6 {
                     return None;
@@ -84,13 +128,18 @@ impl Surface {
                 let distance = dot(sub(origin, center), normal) / facing;
                 let point = along(origin, direction, distance);
                 let inside = sub(point, center);
-                let (depth, outward) = rounded_rectangle([dot(inside, right), dot(inside, up)], half, corner);
+                let (depth, outward) =
+                    rounded_rectangle([dot(inside, right), dot(inside, up)], half, corner);
                 if distance <= 1e-4 || depth < 0.0 {
                     return None;
                 }
                 let bend = (1.0 - depth / BEVEL).max(0.0);
                 let edge = along(scale(right, outward[0]), up, outward[1]);
-                Some(Hit { distance, point, normal: unit(along(normal, edge, bend * bend * 0.9)) })
+                Some(Hit {
+                    distance,
+                    point,
+                    normal: unit(along(normal, edge, bend * bend * 0.9)),
+                })
             }
         }
     }
@@ -99,7 +148,12 @@ impl Surface {
     pub(super) fn texel(&self, hit: &Hit, per_unit: f32) -> [i32; 2] {
         match *self {
             Self::Sphere => on_ball(hit.normal, per_unit),
-            Self::Capsule { axis, half, radius, center } => {
+            Self::Capsule {
+                axis,
+                half,
+                radius,
+                center,
+            } => {
                 let foot = dot(sub(hit.point, center), axis);
                 if foot.abs() >= half {
                     return on_ball(hit.normal, radius * per_unit);
@@ -108,9 +162,14 @@ impl Surface {
                 let turn = dot(hit.normal, y).atan2(dot(hit.normal, x));
                 [whole(foot * per_unit), whole(turn * radius * per_unit)]
             }
-            Self::Panel { center, right, up, .. } => {
+            Self::Panel {
+                center, right, up, ..
+            } => {
                 let inside = sub(hit.point, center);
-                [whole(dot(inside, right) * per_unit), whole(dot(inside, up) * per_unit)]
+                [
+                    whole(dot(inside, right) * per_unit),
+                    whole(dot(inside, up) * per_unit),
+                ]
             }
         }
     }
@@ -137,7 +196,10 @@ fn sphere(center: Vec3, radius: f32, origin: Vec3, direction: Vec3) -> Option<f3
 /// A capsule around the origin.
 fn capsule(axis: Vec3, half: f32, radius: f32, origin: Vec3, direction: Vec3) -> Option<f32> {
     let (along_d, along_o) = (dot(direction, axis), dot(origin, axis));
-    let (d, o) = (along(direction, axis, -along_d), along(origin, axis, -along_o));
+    let (d, o) = (
+        along(direction, axis, -along_d),
+        along(origin, axis, -along_o),
+    );
     let (a, b, c) = (dot(d, d), dot(d, o), dot(o, o) - radius * radius);
     let discriminant = b * b - a * c;
     if a > 1e-9 && discriminant >= 0.0 {
@@ -155,7 +217,10 @@ fn capsule(axis: Vec3, half: f32, radius: f32, origin: Vec3, direction: Vec3) ->
 
 /// Depth inside a rounded rectangle (negative outside) and the outward direction of its nearest edge.
 fn rounded_rectangle(p: [f32; 2], half: [f32; 2], corner: f32) -> (f32, [f32; 2]) {
-    let q = [p[0].abs() - (half[0] - corner), p[1].abs() - (half[1] - corner)];
+    let q = [
+        p[0].abs() - (half[0] - corner),
+        p[1].abs() - (half[1] - corner),
+    ];
     let outside = [q[0].max(0.0), q[1].max(0.0)];
     let length = outside[0].hypot(outside[1]);
     let depth = corner - length - q[0].max(q[1]).min(0.0);
@@ -183,7 +248,15 @@ const CENTERS: [Vec3; 7] = {
     const C: f32 = 0.577_350_3;
     const D: f32 = 0.356_822_1;
     const E: f32 = 0.934_172_4;
-    [[0.0, A, B], [B, 0.0, A], [A, B, 0.0], [C, C, C], [0.0, E, D], [D, 0.0, E], [E, D, 0.0]]
+    [
+        [0.0, A, B],
+        [B, 0.0, A],
+        [A, B, 0.0],
+        [C, C, C],
+        [0.0, E, D],
+        [D, 0.0, E],
+        [E, D, 0.0],
+    ]
 };
 
 /// Texel on a ball whose radius is `radius` texels.
@@ -209,7 +282,10 @@ fn on_ball(n: Vec3, radius: f32) -> [i32; 2] {
     let stretch = (2.0 / (1.0 + nearest)).sqrt() * radius;
     #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // below 56
     let place = (best as i32 * 8 + patch) * 1_000_003;
-    [whole(dot(n, x) * stretch).wrapping_add(place), whole(dot(n, y) * stretch).wrapping_sub(place)]
+    [
+        whole(dot(n, x) * stretch).wrapping_add(place),
+        whole(dot(n, y) * stretch).wrapping_sub(place),
+    ]
 }
 
 #[cfg(test)]
@@ -235,7 +311,10 @@ mod tests {
         }
         // 4π 12² texels; interior ones all get the mean, those cut by a seam less.
         let mean = 400_000.0 / (4.0 * std::f64::consts::PI * 144.0);
-        let full = count.values().filter(|&&c| (f64::from(c) - mean).abs() < 0.06 * mean).count();
+        let full = count
+            .values()
+            .filter(|&&c| (f64::from(c) - mean).abs() < 0.06 * mean)
+            .count();
         assert!(full > 1100, "{full} of {}", count.len());
         assert!(count.values().all(|&c| f64::from(c) < 1.1 * mean));
     }
@@ -248,7 +327,9 @@ mod tests {
             let mut met = 0;
             for target in directions(2000) {
                 let direction = unit(sub(scale(target, 0.9), origin));
-                let Some(hit) = surface.meet(origin, direction) else { continue };
+                let Some(hit) = surface.meet(origin, direction) else {
+                    continue;
+                };
                 met += 1;
                 assert!((dot(hit.normal, hit.normal) - 1.0).abs() < 1e-5);
                 assert!(dot(hit.normal, direction) < 0.5, "{shape:?}: {hit:?}");
@@ -260,7 +341,9 @@ mod tests {
 
     #[test]
     fn a_grazing_ray_still_has_a_finite_hit() {
-        let hit = Surface::Sphere.meet([0.999_999_9, 0.0, 5.0], [0.0, 0.0, -1.0]).expect("meets");
+        let hit = Surface::Sphere
+            .meet([0.999_999_9, 0.0, 5.0], [0.0, 0.0, -1.0])
+            .expect("meets");
         assert!(hit.normal.iter().all(|v| v.is_finite()));
     }
 }

@@ -23,12 +23,21 @@ pub fn texels(
     let [width, height] = size;
     let flakes = paint.flakes.as_ref().ok_or(RenderError::NoFlakes)?;
     if width == 0 || height == 0 || u64::from(width) * u64::from(height) > limits.pixels {
-        let reason = format!("{width} x {height}, accepted are 1 to {} pixels", limits.pixels);
-        return Err(RenderError::Scene { field: "size", reason });
+        let reason = format!(
+            "{width} x {height}, accepted are 1 to {} pixels",
+            limits.pixels
+        );
+        return Err(RenderError::Scene {
+            field: "size",
+            reason,
+        });
     }
     for (field, angle) in [("theta_h_deg", theta_h_deg), ("theta_d_deg", theta_d_deg)] {
         if !(0.0..=90.0).contains(&angle) {
-            return Err(RenderError::Scene { field, reason: format!("{angle}, accepted is 0 to 90") });
+            return Err(RenderError::Scene {
+                field,
+                reason: format!("{angle}, accepted is 0 to 90"),
+            });
         }
     }
     let sampler = FlakeSampler::new(flakes);
@@ -36,5 +45,7 @@ pub fn texels(
     let tile = RandomTexture::new(width, height, spacing, seed);
     #[allow(clippy::cast_possible_truncation)] // texel precision
     let (h, d) = (theta_h_deg as f32, theta_d_deg as f32);
-    Ok(write_exr(width, height, |k| sampler.color(tile.cells()[k], h, d).into())?)
+    Ok(write_exr(width, height, |k| {
+        sampler.color(tile.cells()[k], h, d).into()
+    })?)
 }

@@ -22,7 +22,11 @@ const DESATURATION: f32 = 0.15;
 pub fn neutral(color: Vec3) -> Vec3 {
     let color = color.map(|v| v.max(0.0));
     let least = color[0].min(color[1]).min(color[2]);
-    let offset = if least < 2.0 * F90 { least - least * least / (4.0 * F90) } else { F90 };
+    let offset = if least < 2.0 * F90 {
+        least - least * least / (4.0 * F90)
+    } else {
+        F90
+    };
     let color = color.map(|v| v - offset);
     let peak = color[0].max(color[1]).max(color[2]);
     if peak < START {
@@ -37,7 +41,11 @@ pub fn neutral(color: Vec3) -> Vec3 {
 /// The sRGB curve, 0 to 1.
 #[must_use]
 pub fn encode_srgb(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+    if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,11 @@ pub(super) fn dot(a: Vec3, b: Vec3) -> f32 {
 }
 
 pub(super) fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 pub(super) fn add(a: Vec3, b: Vec3) -> Vec3 {
@@ -29,13 +33,21 @@ pub(super) fn along(a: Vec3, b: Vec3, s: f32) -> Vec3 {
 }
 
 pub(super) fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
-    [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t]
+    [
+        a[0] + (b[0] - a[0]) * t,
+        a[1] + (b[1] - a[1]) * t,
+        a[2] + (b[2] - a[2]) * t,
+    ]
 }
 
 /// The direction of a vector; the y axis where it has none.
 pub(super) fn unit(a: Vec3) -> Vec3 {
     let length = dot(a, a).sqrt();
-    if length > 0.0 { scale(a, 1.0 / length) } else { [0.0, 1.0, 0.0] }
+    if length > 0.0 {
+        scale(a, 1.0 / length)
+    } else {
+        [0.0, 1.0, 0.0]
+    }
 }
 
 pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
@@ -54,14 +66,25 @@ impl Frame {
     /// Axes for a unit normal and a unit direction; any tangent will do where the two are parallel.
     pub(super) fn new(normal: Vec3, view: Vec3) -> Self {
         let across = along(view, normal, -dot(view, normal));
-        let tangent = if dot(across, across) > 1e-12 { unit(across) } else { perpendicular(normal) };
-        Self { tangent, side: cross(normal, tangent) }
+        let tangent = if dot(across, across) > 1e-12 {
+            unit(across)
+        } else {
+            perpendicular(normal)
+        };
+        Self {
+            tangent,
+            side: cross(normal, tangent),
+        }
     }
 }
 
 /// Some unit vector across a unit vector.
 pub(super) fn perpendicular(n: Vec3) -> Vec3 {
-    let axis = if n[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let axis = if n[0].abs() < 0.6 {
+        [1.0, 0.0, 0.0]
+    } else {
+        [0.0, 1.0, 0.0]
+    };
     unit(cross(axis, n))
 }
 

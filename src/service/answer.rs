@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, Response as HttpResponse, StatusCode, header};
+use axum::http::{
+    HeaderMap, HeaderName, HeaderValue, Response as HttpResponse, StatusCode, header,
+};
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use serde::Serialize;
@@ -45,7 +47,12 @@ impl Answer {
             Keep::Never => "no-store",
         };
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static(keep));
-        Self { status: StatusCode::OK, headers, body, stages: Vec::new() }
+        Self {
+            status: StatusCode::OK,
+            headers,
+            body,
+            stages: Vec::new(),
+        }
     }
 
     /// An answer of these bytes.
@@ -64,15 +71,26 @@ impl Answer {
     /// An answer of a blob, a piece at a time.
     #[must_use]
     pub fn blob(media_type: &'static str, hash: Hash, blob: BlobBytes) -> Self {
-        let mut answer = Self::new(media_type, hash, Keep::ForEver, Body::from_stream(blob.pieces));
-        answer.headers.insert(header::CONTENT_LENGTH, HeaderValue::from(blob.length));
+        let mut answer = Self::new(
+            media_type,
+            hash,
+            Keep::ForEver,
+            Body::from_stream(blob.pieces),
+        );
+        answer
+            .headers
+            .insert(header::CONTENT_LENGTH, HeaderValue::from(blob.length));
         answer
     }
 
     /// A JSON answer.
     #[must_use]
     pub fn json(value: &impl Serialize, keep: Keep) -> Self {
-        Self::bytes("application/json", serde_json::to_vec(value).unwrap_or_default(), keep)
+        Self::bytes(
+            "application/json",
+            serde_json::to_vec(value).unwrap_or_default(),
+            keep,
+        )
     }
 
     /// With another status than 200.
@@ -91,7 +109,10 @@ impl Answer {
     /// With a name to save it under.
     #[must_use]
     pub fn saved_as(self, name: &str) -> Self {
-        self.header(header::CONTENT_DISPOSITION, &format!("attachment; filename=\"{name}\""))
+        self.header(
+            header::CONTENT_DISPOSITION,
+            &format!("attachment; filename=\"{name}\""),
+        )
     }
 
     /// With a header. A value that no header can have is left out.
@@ -114,7 +135,8 @@ impl Answer {
 fn etag(hash: Hash) -> HeaderValue {
     // Half the hash tells contents apart just as surely.
     let hex = hash.to_string();
-    HeaderValue::from_str(&format!("\"{}\"", &hex[..32])).unwrap_or(HeaderValue::from_static("\"\""))
+    HeaderValue::from_str(&format!("\"{}\"", &hex[..32]))
+        .unwrap_or(HeaderValue::from_static("\"\""))
 }
 
 impl IntoResponse for Answer {
@@ -131,13 +153,19 @@ impl IntoResponse for Answer {
 
 /// Turns an answer that the caller has already into a 304.
 pub fn unless_known(response: Response, if_none_match: Option<&HeaderValue>) -> Response {
-    let (Some(known), Some(etag)) = (if_none_match, response.headers().get(header::ETAG)) else { return response };
+    let (Some(known), Some(etag)) = (if_none_match, response.headers().get(header::ETAG)) else {
+        return response;
+    };
     if response.status() != StatusCode::OK || !names(known, etag) {
         return response;
     }
     let (mut parts, _) = response.into_parts();
     parts.status = StatusCode::NOT_MODIFIED;
-    for gone in [header::CONTENT_TYPE, header::CONTENT_LENGTH, header::CONTENT_DISPOSITION] {
+    for gone in [
+        header::CONTENT_TYPE,
+        header::CONTENT_LENGTH,
+        header::CONTENT_DISPOSITION,
+    ] {
         parts.headers.remove(gone);
     }
     Response::from_parts(parts, Body::empty())
@@ -145,8 +173,13 @@ pub fn unless_known(response: Response, if_none_match: Option<&HeaderValue>) -> 
 
 /// Weak comparison, as `If-None-Match` asks for.
 fn names(known: &HeaderValue, etag: &HeaderValue) -> bool {
-    let (Ok(known), Ok(etag)) = (known.to_str(), etag.to_str()) else { return false };
-    known.split(',').map(str::trim).any(|one| one == "*" || one.strip_prefix("W/").unwrap_or(one) == etag)
+    let (Ok(known), Ok(etag)) = (known.to_str(), etag.to_str()) else {
+        return false;
+    };
+    known
+        .split(',')
+        .map(str::trim)
+        .any(|one| one == "*" || one.strip_prefix("W/").unwrap_or(one) == etag)
 }
 
 #[cfg(test)]
@@ -156,10 +189,19 @@ mod tests {
     #[test]
     fn if_none_match_is_a_list_of_weak_or_strong_tags() {
         let etag = HeaderValue::from_static("\"abc\"");
-        for (known, same) in
-            [("\"abc\"", true), ("W/\"abc\"", true), ("*", true), ("\"x\", \"abc\"", true), ("abc", false), ("", false)]
-        {
-            assert_eq!(names(&HeaderValue::from_str(known).expect("a header"), &etag), same, "{known}");
+        for (known, same) in [
+            ("\"abc\"", true),
+            ("W/\"abc\"", true),
+            ("*", true),
+            ("\"x\", \"abc\"", true),
+            ("abc", false),
+            ("", false),
+        ] {
+            assert_eq!(
+                names(&HeaderValue::from_str(known).expect("a header"), &etag),
+                same,
+                "{known}"
+            );
         }
     }
 }

@@ -21,8 +21,8 @@ use super::works::{Thing, Works};
 use crate::blend::Blend;
 use crate::paint::PaintFile;
 use crate::store::{
-    BlendRecord, Blobs, CachedResult, Catalogue, FolderBlobs, Hash, PaintRecord, ResultCache, SqliteCatalogue,
-    StoreError,
+    BlendRecord, Blobs, CachedResult, Catalogue, FolderBlobs, Hash, PaintRecord, ResultCache,
+    SqliteCatalogue, StoreError,
 };
 
 /// A running service, shared by its handlers.
@@ -95,7 +95,9 @@ impl Deref for App {
 
 impl std::fmt::Debug for Shared {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Shared").field("config", &self.config).finish_non_exhaustive()
+        f.debug_struct("Shared")
+            .field("config", &self.config)
+            .finish_non_exhaustive()
     }
 }
 
@@ -121,7 +123,11 @@ impl App {
         let lock = lock(&config.data)?;
         let blobs = FolderBlobs::open(&config.data)?;
         let catalogue = SqliteCatalogue::open(&config.data.join("catalogue.sqlite")).await?;
-        let results = ResultCache::open(&config.data.join("results"), config.memory_bytes / 2, config.disk_bytes)?;
+        let results = ResultCache::open(
+            &config.data.join("results"),
+            config.memory_bytes / 2,
+            config.disk_bytes,
+        )?;
         let shelf = Cache::builder()
             .max_capacity(config.memory_bytes / 2)
             .weigher(|_, shelved: &Arc<Shelved>| shelved.weight())
@@ -150,7 +156,9 @@ impl App {
     ///
     /// [`Kind::UnknownPaint`] when there is none.
     pub async fn paint(&self, id: &str) -> Result<Arc<Shelved>, Problem> {
-        self.shelved(id, "p_", || self.read_paint(id)).await?.ok_or_else(|| unknown_paint(id))
+        self.shelved(id, "p_", || self.read_paint(id))
+            .await?
+            .ok_or_else(|| unknown_paint(id))
     }
 
     /// The blend of this id.
@@ -159,10 +167,12 @@ impl App {
     ///
     /// [`Kind::UnknownBlend`] when there is none.
     pub async fn blend(&self, id: &str) -> Result<Arc<Shelved>, Problem> {
-        self.shelved(id, "b_", || self.read_blend(id)).await?.ok_or_else(|| {
-            Problem::new(Kind::UnknownBlend, format!("There is no blend {id:?}."))
-                .accepting("the id of an answer to POST /v1/blends")
-        })
+        self.shelved(id, "b_", || self.read_blend(id))
+            .await?
+            .ok_or_else(|| {
+                Problem::new(Kind::UnknownBlend, format!("There is no blend {id:?}."))
+                    .accepting("the id of an answer to POST /v1/blends")
+            })
     }
 
     /// From the shelf, or read once however many ask.
@@ -191,7 +201,9 @@ impl App {
     }
 
     async fn read_paint(&self, id: &str) -> Result<Option<Shelved>, Problem> {
-        let Some(record) = self.catalogue.paint(id).await? else { return Ok(None) };
+        let Some(record) = self.catalogue.paint(id).await? else {
+            return Ok(None);
+        };
         let bytes = self.stored(record.paint).await?;
         let (limits, works) = (self.config.limits, Arc::clone(&self.works));
         let shelve = move || -> Result<Shelved, Problem> {
@@ -200,26 +212,59 @@ impl App {
             let thing = Thing::Paint(Box::new(file));
             let links = super::paints::links(&record);
             let document = super::documents::described(&record.id, works.describe(&thing), links);
-            let PaintRecord { id, paint: file, measurement, content, .. } = record;
-            Ok(Shelved { id, thing, names, document, file, content, measurement })
+            let PaintRecord {
+                id,
+                paint: file,
+                measurement,
+                content,
+                ..
+            } = record;
+            Ok(Shelved {
+                id,
+                thing,
+                names,
+                document,
+                file,
+                content,
+                measurement,
+            })
         };
         self.bench.run(shelve).await?.map(Some)
     }
 
     async fn read_blend(&self, id: &str) -> Result<Option<Shelved>, Problem> {
-        let Some(BlendRecord { id, paints, options, blend: file }) = self.catalogue.blend(id).await? else {
+        let Some(BlendRecord {
+            id,
+            paints,
+            options,
+            blend: file,
+        }) = self.catalogue.blend(id).await?
+        else {
             return Ok(None);
         };
         let options: BlendOptions = serde_json::from_str(&options).map_err(Problem::internal)?;
         let bytes = self.stored(file).await?;
         let (limits, works) = (self.config.limits, Arc::clone(&self.works));
         let shelve = move || -> Result<Shelved, Problem> {
-            let blend = Blend::from_bytes(&bytes, &limits).map_err(Problem::internal)?.in_order(&options.places);
-            let names = blend.ingredients().map(|(name, _)| name.to_owned()).collect();
+            let blend = Blend::from_bytes(&bytes, &limits)
+                .map_err(Problem::internal)?
+                .in_order(&options.places);
+            let names = blend
+                .ingredients()
+                .map(|(name, _)| name.to_owned())
+                .collect();
             let thing = Thing::Blend(Box::new(blend));
             let links = super::blends::links(&id, &paints, &options);
             let document = super::documents::described(&id, works.describe(&thing), links);
-            Ok(Shelved { id, thing, names, document, file, content: file, measurement: None })
+            Ok(Shelved {
+                id,
+                thing,
+                names,
+                document,
+                file,
+                content: file,
+                measurement: None,
+            })
         };
         self.bench.run(shelve).await?.map(Some)
     }
@@ -257,10 +302,16 @@ impl App {
     /// # Errors
     ///
     /// [`Problem`] when the store fails.
-    pub async fn keep_paint(&self, id: &str, file: PaintFile, measurement: Option<Hash>) -> Result<(), Problem> {
+    pub async fn keep_paint(
+        &self,
+        id: &str,
+        file: PaintFile,
+        measurement: Option<Hash>,
+    ) -> Result<(), Problem> {
         let _writing = self.removal.read().await;
-        let hashed =
-            tokio::task::spawn_blocking(move || (file.to_bytes(), Hash::from(file.paint.content_hash()), file));
+        let hashed = tokio::task::spawn_blocking(move || {
+            (file.to_bytes(), Hash::from(file.paint.content_hash()), file)
+        });
         let (bytes, content, file) = hashed.await.map_err(Problem::internal)?;
         let paint = self.blobs.put(bytes.into()).await?.hash;
         let record = PaintRecord {
@@ -282,7 +333,11 @@ impl App {
     /// [`Kind::UnknownPaint`] when there is none.
     pub async fn forget_paint(&self, id: &str) -> Result<(), Problem> {
         let _removing = self.removal.write().await;
-        let gone = self.catalogue.remove_paint(id).await?.ok_or_else(|| unknown_paint(id))?;
+        let gone = self
+            .catalogue
+            .remove_paint(id)
+            .await?
+            .ok_or_else(|| unknown_paint(id))?;
         self.shelf.invalidate(id).await;
         for blob in gone.measurement.into_iter().chain([gone.paint]) {
             self.forget_unnamed(blob).await?;
@@ -331,19 +386,28 @@ impl App {
 
     /// Returns once the service goes down.
     pub async fn stopped(&self) {
-        let _ = self.stopping.subscribe().wait_for(|&stopping| stopping).await;
+        let _ = self
+            .stopping
+            .subscribe()
+            .wait_for(|&stopping| stopping)
+            .await;
     }
 }
 
 fn unknown_paint(id: &str) -> Problem {
-    Problem::new(Kind::UnknownPaint, format!("There is no paint {id:?}.")).accepting("an id that GET /v1/paints lists")
+    Problem::new(Kind::UnknownPaint, format!("There is no paint {id:?}."))
+        .accepting("an id that GET /v1/paints lists")
 }
 
 impl Shelved {
     /// Bytes in memory, about.
     fn weight(&self) -> u32 {
         let clusters = match &self.thing {
-            Thing::Paint(file) => file.paint.flakes.as_ref().map_or(0, crate::paint::Flakes::clusters),
+            Thing::Paint(file) => file
+                .paint
+                .flakes
+                .as_ref()
+                .map_or(0, crate::paint::Flakes::clusters),
             Thing::Blend(blend) => blend.report().clusters * blend.len(),
         };
         // A box is 24 bytes and a probability 8.

@@ -70,14 +70,19 @@ pub async fn create(
     let most = app.config.limits.paints;
     if !(2..=most).contains(&order.paints.len()) {
         let detail = format!("{} paints are to be blended.", order.paints.len());
-        return Err(Problem::value("/paints", detail).accepting(format!("2 to {most} ids of paints")));
+        return Err(
+            Problem::value("/paints", detail).accepting(format!("2 to {most} ids of paints"))
+        );
     }
     let refuse = |field: &str, detail: String| Problem::value(format!("/{field}"), detail);
     let accuracy = accuracy("clusters", refuse, order.profile, order.clusters)?;
     for (place, id) in order.paints.iter().enumerate() {
         if !ids::is("p_", id) || app.catalogue.paint(id).await?.is_none() {
-            return Err(Problem::value(format!("/paints/{place}"), format!("There is no paint {id:?}."))
-                .accepting("ids that GET /v1/paints lists"));
+            return Err(Problem::value(
+                format!("/paints/{place}"),
+                format!("There is no paint {id:?}."),
+            )
+            .accepting("ids that GET /v1/paints lists"));
         }
     }
     let id = ids::made_of("b_", &(&order.paints, accuracy));
@@ -87,7 +92,10 @@ pub async fn create(
         let answer = Answer::result("application/json", known, Keep::Revalidated);
         return Ok(answer.location(&address).into_response());
     }
-    let request = BlendRequest { paints: order.paints, accuracy };
+    let request = BlendRequest {
+        paints: order.paints,
+        accuracy,
+    };
     let job = runner::submit(&app, JobKind::Blend, &id, &request).await?;
     let made = || async { Ok(app.blend(&id).await?.document.clone()) };
     prefer.answer(&app, &job, &address, made).await
@@ -123,8 +131,16 @@ pub(super) async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended,
     under_way.stage("storing");
     let _writing = app.removal.read().await;
     let blend = app.blobs.put(file).await?.hash;
-    let options = serde_json::to_string(&BlendOptions { accuracy, places }).map_err(Problem::internal)?;
-    app.catalogue.add_blend(&BlendRecord { id: id.clone(), paints, options, blend }).await?;
+    let options =
+        serde_json::to_string(&BlendOptions { accuracy, places }).map_err(Problem::internal)?;
+    app.catalogue
+        .add_blend(&BlendRecord {
+            id: id.clone(),
+            paints,
+            options,
+            blend,
+        })
+        .await?;
     Ok(Ok(()))
 }
 
@@ -136,11 +152,19 @@ async fn correspond(
 ) -> Result<Bytes, Problem> {
     let works = Arc::clone(&app.works);
     let found = under_way.compute(app, "blending", move |progress| {
-        let files: Vec<&PaintFile> = paints.iter().filter_map(|paint| paint.file_of_paint()).collect();
-        works.blend(&files, accuracy, progress).map(|blend| Bytes::from(blend.to_bytes()))
+        let files: Vec<&PaintFile> = paints
+            .iter()
+            .filter_map(|paint| paint.file_of_paint())
+            .collect();
+        works
+            .blend(&files, accuracy, progress)
+            .map(|blend| Bytes::from(blend.to_bytes()))
     });
     let Ok(found) = found.await? else {
-        return Err(Problem::new(Kind::JobCancelled, "The job that found this correspondence was cancelled."));
+        return Err(Problem::new(
+            Kind::JobCancelled,
+            "The job that found this correspondence was cancelled.",
+        ));
     };
     let file = found.map_err(super::works::WorkError::of_body)?;
     app.metrics.blends_computed.increment(1);
@@ -157,7 +181,10 @@ fn in_order_of_hashes(asked: &[Arc<Shelved>]) -> (Vec<Arc<Shelved>>, Vec<usize>)
     for (place, &k) in order.iter().enumerate() {
         places[k] = place;
     }
-    (order.iter().map(|&k| Arc::clone(&asked[k])).collect(), places)
+    (
+        order.iter().map(|&k| Arc::clone(&asked[k])).collect(),
+        places,
+    )
 }
 
 impl Shelved {
@@ -178,15 +205,25 @@ impl Shelved {
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
 )]
-pub async fn show(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Answer, Problem> {
+pub async fn show(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    _: NoQuery,
+) -> Result<Answer, Problem> {
     let blend = app.blend(&id).await?;
-    Ok(Answer::result("application/json", blend.document.clone(), Keep::Revalidated))
+    Ok(Answer::result(
+        "application/json",
+        blend.document.clone(),
+        Keep::Revalidated,
+    ))
 }
 
 /// What was asked for, and addresses of what can be made of it.
 pub(super) fn links(id: &str, paints: &[String], options: &BlendOptions) -> Value {
     let base = format!("/v1/blends/{id}");
-    let weights = vec![(1.0 / f64::from(u32::try_from(paints.len()).unwrap_or(1))).to_string(); paints.len()].join(",");
+    let weights =
+        vec![(1.0 / f64::from(u32::try_from(paints.len()).unwrap_or(1))).to_string(); paints.len()]
+            .join(",");
     json!({
         "request": { "paints": paints, "profile": options.accuracy.profile, "clusters": options.accuracy.clusters },
         "links": {

@@ -105,5 +105,8 @@ pub fn described(id: &str, description: Value, extra: Value) -> CachedResult {
         document.extend(extra);
     }
     let bytes = Bytes::from(Value::Object(document).to_string());
-    CachedResult { hash: Hash::of(&bytes), bytes }
+    CachedResult {
+        hash: Hash::of(&bytes),
+        bytes,
+    }
 }

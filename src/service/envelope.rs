@@ -27,19 +27,29 @@ pub async fn envelope(State(app): State<App>, request: Request, next: Next) -> R
     let method = request.method().clone();
     let route = request.extensions().get::<MatchedPath>().cloned();
     let reads = matches!(method, Method::GET | Method::HEAD);
-    let if_none_match = reads.then(|| request.headers().get(header::IF_NONE_MATCH).cloned()).flatten();
+    let if_none_match = reads
+        .then(|| request.headers().get(header::IF_NONE_MATCH).cloned())
+        .flatten();
 
     let answered = AssertUnwindSafe(next.run(request)).catch_unwind().await;
-    let response = answered.unwrap_or_else(|_| Problem::internal("a handler panicked").into_response());
+    let response =
+        answered.unwrap_or_else(|_| Problem::internal("a handler panicked").into_response());
     let response = problem::finish(response, id.to_str().unwrap_or("-"));
     let mut response = unless_known(response, if_none_match.as_ref());
 
     let time = start.elapsed();
-    let stages = response.extensions_mut().remove::<Stages>().unwrap_or_default();
+    let stages = response
+        .extensions_mut()
+        .remove::<Stages>()
+        .unwrap_or_default();
     let mut timing = String::with_capacity(64);
     for (name, time) in stages.0.into_iter().chain([("total", time)]) {
         let separator = if timing.is_empty() { "" } else { ", " };
-        let _ = write!(timing, "{separator}{name};dur={:.3}", time.as_secs_f64() * 1e3);
+        let _ = write!(
+            timing,
+            "{separator}{name};dur={:.3}",
+            time.as_secs_f64() * 1e3
+        );
     }
     let route = route.as_ref().map_or("none", MatchedPath::as_str);
     app.metrics.request(&method, route, response.status(), time);
@@ -49,7 +59,10 @@ pub async fn envelope(State(app): State<App>, request: Request, next: Next) -> R
     }
     let headers = response.headers_mut();
     headers.insert(REQUEST_ID, id);
-    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(
+        header::X_CONTENT_TYPE_OPTIONS,
+        HeaderValue::from_static("nosniff"),
+    );
     if let Ok(timing) = HeaderValue::from_str(&timing) {
         headers.insert(SERVER_TIMING, timing);
     }
@@ -60,9 +73,18 @@ pub async fn envelope(State(app): State<App>, request: Request, next: Next) -> R
 fn request_id(request: &Request) -> HeaderValue {
     let plain = |id: &&HeaderValue| {
         (1..=LONGEST_ID).contains(&id.len())
-            && id.as_bytes().iter().all(|&byte| byte.is_ascii_alphanumeric() || b"-_.:".contains(&byte))
+            && id
+                .as_bytes()
+                .iter()
+                .all(|&byte| byte.is_ascii_alphanumeric() || b"-_.:".contains(&byte))
     };
-    request.headers().get(REQUEST_ID).filter(plain).cloned().unwrap_or_else(|| {
-        HeaderValue::from_str(&super::ids::random("r_")).unwrap_or(HeaderValue::from_static("r_unknown"))
-    })
+    request
+        .headers()
+        .get(REQUEST_ID)
+        .filter(plain)
+        .cloned()
+        .unwrap_or_else(|| {
+            HeaderValue::from_str(&super::ids::random("r_"))
+                .unwrap_or(HeaderValue::from_static("r_unknown"))
+        })
 }

@@ -37,14 +37,25 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Json<T> {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
-        let media_type = request.headers().get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok());
-        let media_type = media_type.and_then(|value| value.split(';').next()).unwrap_or("").trim();
-        let is_json = media_type.eq_ignore_ascii_case("application/json") || media_type.ends_with("+json");
+        let media_type = request
+            .headers()
+            .get(header::CONTENT_TYPE)
+            .and_then(|value| value.to_str().ok());
+        let media_type = media_type
+            .and_then(|value| value.split(';').next())
+            .unwrap_or("")
+            .trim();
+        let is_json =
+            media_type.eq_ignore_ascii_case("application/json") || media_type.ends_with("+json");
         if !is_json {
             let detail = format!("The body is of type {media_type:?}.");
-            return Err(Problem::new(Kind::UnsupportedMediaType, detail).accepting("application/json"));
+            return Err(
+                Problem::new(Kind::UnsupportedMediaType, detail).accepting("application/json")
+            );
         }
-        let body = Bytes::from_request(request, state).await.map_err(|error| broken_body(&error))?;
+        let body = Bytes::from_request(request, state)
+            .await
+            .map_err(|error| broken_body(&error))?;
         read_json(&body).map(Self)
     }
 }
@@ -54,7 +65,10 @@ fn broken_body(error: &BytesRejection) -> Problem {
         return Problem::new(Kind::TooLarge, "The JSON in the body is too large.")
             .accepting(format!("up to {JSON_BYTES} bytes"));
     }
-    Problem::new(Kind::MalformedRequest, "The body could not be read to its end.")
+    Problem::new(
+        Kind::MalformedRequest,
+        "The body could not be read to its end.",
+    )
 }
 
 fn read_json<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
@@ -62,27 +76,41 @@ fn read_json<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
     let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         let parent = pointer(error.path());
         let cause = error.into_inner();
-        let pointer = named_field(&cause).filter(|_| parent.is_empty()).map_or(parent, |name| format!("/{name}"));
+        let pointer = named_field(&cause)
+            .filter(|_| parent.is_empty())
+            .map_or(parent, |name| format!("/{name}"));
         match cause.classify() {
             serde_json::error::Category::Data => Problem::value(pointer, sentence(&cause)),
-            _ => Problem::new(Kind::MalformedRequest, format!("The body is not JSON: {cause}.")),
+            _ => Problem::new(
+                Kind::MalformedRequest,
+                format!("The body is not JSON: {cause}."),
+            ),
         }
     })?;
-    reader.end().map_err(|error| Problem::new(Kind::MalformedRequest, format!("The body is not JSON: {error}.")))?;
+    reader.end().map_err(|error| {
+        Problem::new(
+            Kind::MalformedRequest,
+            format!("The body is not JSON: {error}."),
+        )
+    })?;
     Ok(value)
 }
 
 /// The field that an object lacks or has twice: the reader names it, but does not point at it.
 fn named_field(cause: &serde_json::Error) -> Option<String> {
     let text = cause.to_string();
-    let rest = text.strip_prefix("missing field `").or_else(|| text.strip_prefix("duplicate field `"))?;
+    let rest = text
+        .strip_prefix("missing field `")
+        .or_else(|| text.strip_prefix("duplicate field `"))?;
     rest.split_once('`').map(|(name, _)| name.to_owned())
 }
 
 fn sentence(cause: &serde_json::Error) -> String {
     let text = cause.to_string();
     let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))
+    letters.next().map_or(String::new(), |first| {
+        format!("{}{}.", first.to_uppercase(), letters.as_str())
+    })
 }
 
 /// RFC 6901.
@@ -108,7 +136,9 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Query<T> {
     }
 }
 
-impl<S: Send + Sync, A: DeserializeOwned, B: DeserializeOwned> FromRequestParts<S> for QueryOfTwo<A, B> {
+impl<S: Send + Sync, A: DeserializeOwned, B: DeserializeOwned> FromRequestParts<S>
+    for QueryOfTwo<A, B>
+{
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
@@ -132,7 +162,10 @@ impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for Address
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         match Path::from_request_parts(parts, state).await {
             Ok(Path(address)) => Ok(Self(address)),
-            Err(_) => Err(Problem::new(Kind::UnknownAddress, "There is nothing at this address.")),
+            Err(_) => Err(Problem::new(
+                Kind::UnknownAddress,
+                "There is nothing at this address.",
+            )),
         }
     }
 }
@@ -159,12 +192,21 @@ mod tests {
             (r"[]", 422, ""),
         ];
         for (body, status, pointer) in cases {
-            let problem = read_json::<Order>(body.as_bytes()).expect_err(body).document(None);
-            assert_eq!((problem.status, problem.pointer.as_deref()), (status, Some(pointer)), "{body}: {problem:?}");
+            let problem = read_json::<Order>(body.as_bytes())
+                .expect_err(body)
+                .document(None);
+            assert_eq!(
+                (problem.status, problem.pointer.as_deref()),
+                (status, Some(pointer)),
+                "{body}: {problem:?}"
+            );
         }
         for body in ["", "{", "[]x", "{\"paints\": []} x", "\u{1}"] {
             let problem = read_json::<Order>(body.as_bytes()).expect_err(body);
-            assert!(matches!(problem.kind(), Kind::MalformedRequest | Kind::InvalidValue), "{body}: {problem:?}");
+            assert!(
+                matches!(problem.kind(), Kind::MalformedRequest | Kind::InvalidValue),
+                "{body}: {problem:?}"
+            );
         }
     }
 }

@@ -17,7 +17,11 @@ pub async fn page() -> Answer {
 
 /// `/studio/page.js`
 pub async fn script() -> Answer {
-    Answer::bytes("text/javascript; charset=utf-8", studio::SCRIPT, Keep::Revalidated)
+    Answer::bytes(
+        "text/javascript; charset=utf-8",
+        studio::SCRIPT,
+        Keep::Revalidated,
+    )
 }
 
 /// `/studio/page.css`

@@ -28,8 +28,15 @@ const PACE: Duration = Duration::from_millis(100);
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
 )]
-pub async fn show(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Answer, Problem> {
-    Ok(Answer::json(&runner::look_up(&app, &id).await?, Keep::Never))
+pub async fn show(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    _: NoQuery,
+) -> Result<Answer, Problem> {
+    Ok(Answer::json(
+        &runner::look_up(&app, &id).await?,
+        Keep::Never,
+    ))
 }
 
 /// What a job tells while it goes on.
@@ -44,22 +51,40 @@ pub async fn show(State(app): State<App>, Address(id): Address<String>, _: NoQue
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
 )]
-pub async fn events(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Response, Problem> {
+pub async fn events(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    _: NoQuery,
+) -> Result<Response, Problem> {
     let news = runner::follow(&app, &id);
     let now = runner::look_up(&app, &id).await?;
     let stopped = async move { app.stopped().await };
     let events = tell(now, news).take_until(Box::pin(stopped)).map(|job| {
-        let name = if job.state.is_final() { "end" } else { "progress" };
-        let event = Event::default().event(name).json_data(&job).unwrap_or_default();
+        let name = if job.state.is_final() {
+            "end"
+        } else {
+            "progress"
+        };
+        let event = Event::default()
+            .event(name)
+            .json_data(&job)
+            .unwrap_or_default();
         Ok::<_, Infallible>(event)
     });
-    let mut response = Sse::new(events).keep_alive(KeepAlive::default()).into_response();
-    response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    let mut response = Sse::new(events)
+        .keep_alive(KeepAlive::default())
+        .into_response();
+    response
+        .headers_mut()
+        .insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
     Ok(response)
 }
 
 /// The job as it is now, then each time it has changed, up to its end.
-fn tell(now: JobDocument, news: Option<watch::Receiver<JobDocument>>) -> impl Stream<Item = JobDocument> {
+fn tell(
+    now: JobDocument,
+    news: Option<watch::Receiver<JobDocument>>,
+) -> impl Stream<Item = JobDocument> {
     let later = stream::unfold((now.state.is_final(), news), |(ended, news)| async move {
         let mut news = news.filter(|_| !ended)?;
         tokio::time::sleep(PACE).await;
@@ -83,6 +108,10 @@ fn tell(now: JobDocument, news: Option<watch::Receiver<JobDocument>>) -> impl St
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
 )]
-pub async fn cancel(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Answer, Problem> {
+pub async fn cancel(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    _: NoQuery,
+) -> Result<Answer, Problem> {
     Ok(Answer::json(&runner::cancel(&app, &id).await?, Keep::Never))
 }

@@ -39,8 +39,10 @@ impl Metrics {
     /// Never: the buckets are not empty.
     #[must_use]
     pub fn new() -> Self {
-        let recorder =
-            PrometheusBuilder::new().set_buckets(&BUCKETS).expect("the buckets are not empty").build_recorder();
+        let recorder = PrometheusBuilder::new()
+            .set_buckets(&BUCKETS)
+            .expect("the buckets are not empty")
+            .build_recorder();
         let counter = |name: &'static str, what: &'static str| {
             recorder.describe_counter(name.into(), Some(Unit::Count), what.into());
             let counter = recorder.register_counter(&Key::from_static_name(name), &METADATA);
@@ -48,16 +50,32 @@ impl Metrics {
             counter
         };
         let paints_fitted = counter("carpaint_paints_fitted_total", "Uploads that were fitted");
-        let blends_computed = counter("carpaint_blends_computed_total", "Correspondences that were found");
-        let realisations_computed = counter("carpaint_realisations_computed_total", "Realisations that were computed");
-        let previews_rendered = counter("carpaint_previews_rendered_total", "Pictures that were rendered");
+        let blends_computed = counter(
+            "carpaint_blends_computed_total",
+            "Correspondences that were found",
+        );
+        let realisations_computed = counter(
+            "carpaint_realisations_computed_total",
+            "Realisations that were computed",
+        );
+        let previews_rendered = counter(
+            "carpaint_previews_rendered_total",
+            "Pictures that were rendered",
+        );
         recorder.describe_histogram(
             "carpaint_http_request_seconds".into(),
             Some(Unit::Seconds),
             "Time from a request's header to its answer's".into(),
         );
         let handle = recorder.handle();
-        Self { recorder, handle, paints_fitted, blends_computed, realisations_computed, previews_rendered }
+        Self {
+            recorder,
+            handle,
+            paints_fitted,
+            blends_computed,
+            realisations_computed,
+            previews_rendered,
+        }
     }
 
     /// Counts a request.
@@ -75,7 +93,9 @@ impl Metrics {
             Label::new("status", status.as_str().to_owned()),
         ];
         let key = Key::from_parts("carpaint_http_request_seconds", labels);
-        self.recorder.register_histogram(&key, &METADATA).record(time.as_secs_f64());
+        self.recorder
+            .register_histogram(&key, &METADATA)
+            .record(time.as_secs_f64());
     }
 
     /// The counts in Prometheus' text format.

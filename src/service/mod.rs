@@ -39,8 +39,8 @@ pub use docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
-    Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH, Thing, View,
-    WorkError, Works,
+    Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH,
+    Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 

@@ -19,7 +19,13 @@ pub struct Health {
 
 impl Health {
     fn ok() -> Answer {
-        Answer::json(&Self { status: "ok", version: env!("CARGO_PKG_VERSION") }, Keep::Never)
+        Answer::json(
+            &Self {
+                status: "ok",
+                version: env!("CARGO_PKG_VERSION"),
+            },
+            Keep::Never,
+        )
     }
 }
 

@@ -94,21 +94,28 @@ impl Hash64 {
 impl IngestQuery {
     fn order(self) -> Result<IngestOrder, Problem> {
         if let Some(name) = &self.name
-            && (!(1..=LONGEST_NAME).contains(&name.chars().count()) || name.chars().any(char::is_control))
+            && (!(1..=LONGEST_NAME).contains(&name.chars().count())
+                || name.chars().any(char::is_control))
         {
-            return Err(Problem::parameter("name", "The name is empty, too long, or holds control characters.")
-                .accepting("1 to 200 printable characters"));
+            return Err(Problem::parameter(
+                "name",
+                "The name is empty, too long, or holds control characters.",
+            )
+            .accepting("1 to 200 printable characters"));
         }
         if let Some(ior) = self.coat_ior
             && !(1.0..=4.0).contains(&ior)
         {
-            return Err(Problem::parameter("coat_ior", format!("coat_ior is {ior}.")).accepting("1 to 4"));
+            return Err(
+                Problem::parameter("coat_ior", format!("coat_ior is {ior}.")).accepting("1 to 4"),
+            );
         }
         if let Some(bytes) = self.header_bytes
             && bytes > 1 << 20
         {
             return Err(
-                Problem::parameter("header_bytes", format!("header_bytes is {bytes}.")).accepting("0 to 1048576")
+                Problem::parameter("header_bytes", format!("header_bytes is {bytes}."))
+                    .accepting("0 to 1048576"),
             );
         }
         Ok(IngestOrder {
@@ -133,7 +140,10 @@ pub(super) fn accuracy(
         Some(clusters) if !(1..=4096).contains(&clusters) => {
             Err(refuse(field, format!("clusters is {clusters}.")).accepting("1 to 4096"))
         }
-        _ => Ok(Accuracy { profile: profile.unwrap_or_default(), clusters }),
+        _ => Ok(Accuracy {
+            profile: profile.unwrap_or_default(),
+            clusters,
+        }),
     }
 }
 
@@ -180,11 +190,18 @@ pub async fn upload(
     if app.catalogue.paint(&id).await?.is_some() {
         drop(naming);
         let known = app.paint(&id).await?;
-        return Ok(Answer::result("application/json", known.document.clone(), Keep::Revalidated)
-            .location(&address)
-            .into_response());
+        return Ok(Answer::result(
+            "application/json",
+            known.document.clone(),
+            Keep::Revalidated,
+        )
+        .location(&address)
+        .into_response());
     }
-    let request = IngestRequest { upload: Hash64(stored.hash.to_string()), order };
+    let request = IngestRequest {
+        upload: Hash64(stored.hash.to_string()),
+        order,
+    };
     let job = runner::submit(&app, JobKind::Ingest, &id, &request).await;
     drop(naming);
     let job = match job {
@@ -201,15 +218,30 @@ pub async fn upload(
 fn check_headers(app: &App, headers: &HeaderMap) -> Result<(), Problem> {
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     if text(header::CONTENT_TYPE).is_some_and(|kind| kind.starts_with("multipart/")) {
-        let problem = Problem::new(Kind::UnsupportedMediaType, "The upload is wrapped in a multipart form.");
-        return Err(problem.accepting("the file's bytes as the body, as curl --data-binary @FILE sends them"));
+        let problem = Problem::new(
+            Kind::UnsupportedMediaType,
+            "The upload is wrapped in a multipart form.",
+        );
+        return Err(problem
+            .accepting("the file's bytes as the body, as curl --data-binary @FILE sends them"));
     }
-    if let Some(encoding) = text(header::CONTENT_ENCODING).filter(|encoding| *encoding != "identity") {
-        let problem = Problem::new(Kind::UnsupportedMediaType, format!("The upload is encoded as {encoding:?}."));
+    if let Some(encoding) =
+        text(header::CONTENT_ENCODING).filter(|encoding| *encoding != "identity")
+    {
+        let problem = Problem::new(
+            Kind::UnsupportedMediaType,
+            format!("The upload is encoded as {encoding:?}."),
+        );
         return Err(problem.accepting("the file's bytes as they are"));
     }
-    let announced: u64 = text(header::CONTENT_LENGTH).and_then(|length| length.parse().ok()).unwrap_or(0);
-    if announced > app.config.limits.bytes { Err(too_large(app)) } else { Ok(()) }
+    let announced: u64 = text(header::CONTENT_LENGTH)
+        .and_then(|length| length.parse().ok())
+        .unwrap_or(0);
+    if announced > app.config.limits.bytes {
+        Err(too_large(app))
+    } else {
+        Ok(())
+    }
 }
 
 fn too_large(app: &App) -> Problem {
@@ -239,10 +271,16 @@ async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Problem> 
             Ok(None) => break,
             Ok(Some(Ok(piece))) => piece,
             Ok(Some(Err(_))) => {
-                return Err(Problem::new(Kind::MalformedRequest, "The upload broke off before its end."));
+                return Err(Problem::new(
+                    Kind::MalformedRequest,
+                    "The upload broke off before its end.",
+                ));
             }
             Err(_) => {
-                let detail = format!("Nothing came for {} seconds in the middle of the upload.", SILENCE.as_secs());
+                let detail = format!(
+                    "Nothing came for {} seconds in the middle of the upload.",
+                    SILENCE.as_secs()
+                );
                 return Err(Problem::new(Kind::RequestTimeout, detail));
             }
         };
@@ -276,7 +314,9 @@ pub(super) async fn ingest(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended
         let folder = local.path().display().to_string();
         fitted.map_err(|error| error.without(&folder))
     });
-    let Ok(fitted) = fitted.await? else { return Ok(Err(CalledOff)) };
+    let Ok(fitted) = fitted.await? else {
+        return Ok(Err(CalledOff));
+    };
     let file = fitted.map_err(super::works::WorkError::of_upload)?;
     app.metrics.paints_fitted.increment(1);
     under_way.stage("storing");
@@ -297,17 +337,31 @@ pub(super) async fn forget_upload(app: &App, job: &JobRecord) -> Result<(), Prob
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
 )]
-pub async fn list(State(app): State<App>, Query(query): Query<ListQuery>) -> Result<Answer, Problem> {
-    let cursor = query.cursor.as_deref().map(|cursor| i64::from_str_radix(cursor, 36)).transpose();
+pub async fn list(
+    State(app): State<App>,
+    Query(query): Query<ListQuery>,
+) -> Result<Answer, Problem> {
+    let cursor = query
+        .cursor
+        .as_deref()
+        .map(|cursor| i64::from_str_radix(cursor, 36))
+        .transpose();
     let cursor = cursor.map_err(|_| {
-        Problem::parameter("cursor", "The cursor was not made here.").accepting("`next` of the page before")
+        Problem::parameter("cursor", "The cursor was not made here.")
+            .accepting("`next` of the page before")
     })?;
     let limit = query.limit.unwrap_or(50);
     if !(1..=LONGEST_PAGE).contains(&limit) {
         return Err(Problem::parameter("limit", format!("limit is {limit}.")).accepting("1 to 200"));
     }
-    let page = app.catalogue.paints(query.q.as_deref(), cursor, limit).await?;
-    let list = PaintList { paints: page.paints.into_iter().map(summary).collect(), next: page.next.map(base36) };
+    let page = app
+        .catalogue
+        .paints(query.q.as_deref(), cursor, limit)
+        .await?;
+    let list = PaintList {
+        paints: page.paints.into_iter().map(summary).collect(),
+        next: page.next.map(base36),
+    };
     Ok(Answer::json(&list, Keep::Revalidated))
 }
 
@@ -342,9 +396,17 @@ fn summary(record: PaintRecord) -> PaintSummary {
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
 )]
-pub async fn show(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Answer, Problem> {
+pub async fn show(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    _: NoQuery,
+) -> Result<Answer, Problem> {
     let paint = app.paint(&id).await?;
-    Ok(Answer::result("application/json", paint.document.clone(), Keep::Revalidated))
+    Ok(Answer::result(
+        "application/json",
+        paint.document.clone(),
+        Keep::Revalidated,
+    ))
 }
 
 /// A paint as a `.paint` file.
@@ -356,7 +418,11 @@ pub async fn show(State(app): State<App>, Address(id): Address<String>, _: NoQue
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
 )]
-pub async fn file(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Answer, Problem> {
+pub async fn file(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    _: NoQuery,
+) -> Result<Answer, Problem> {
     let paint = app.paint(&id).await?;
     let missing = || Problem::internal(format!("the file of {id} is not there"));
     let blob = app.blobs.stream(paint.file).await?.ok_or_else(missing)?;
@@ -372,13 +438,23 @@ pub async fn file(State(app): State<App>, Address(id): Address<String>, _: NoQue
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
 )]
-pub async fn measurement(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<Answer, Problem> {
+pub async fn measurement(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    _: NoQuery,
+) -> Result<Answer, Problem> {
     let paint = app.paint(&id).await?;
-    let none = || Problem::new(Kind::NoMeasurement, "This paint was not uploaded as a measurement.");
+    let none = || {
+        Problem::new(
+            Kind::NoMeasurement,
+            "This paint was not uploaded as a measurement.",
+        )
+    };
     let upload = paint.measurement.ok_or_else(none)?;
     let missing = || Problem::internal(format!("the measurement of {id} is not there"));
     let blob = app.blobs.stream(upload).await?.ok_or_else(missing)?;
-    Ok(Answer::blob("application/octet-stream", upload, blob).saved_as(&format!("{id}.measurement")))
+    Ok(Answer::blob("application/octet-stream", upload, blob)
+        .saved_as(&format!("{id}.measurement")))
 }
 
 /// Delete a paint with its measurement. Blends that were made of it stay.
@@ -390,7 +466,11 @@ pub async fn measurement(State(app): State<App>, Address(id): Address<String>, _
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
 )]
-pub async fn delete(State(app): State<App>, Address(id): Address<String>, _: NoQuery) -> Result<StatusCode, Problem> {
+pub async fn delete(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    _: NoQuery,
+) -> Result<StatusCode, Problem> {
     app.forget_paint(&id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -48,7 +48,11 @@ impl FromStr for Size {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let side = |side: &str| side.parse().ok().filter(|pixels| (1..=LONGEST_SIDE).contains(pixels));
+        let side = |side: &str| {
+            side.parse()
+                .ok()
+                .filter(|pixels| (1..=LONGEST_SIDE).contains(pixels))
+        };
         text.split_once('x')
             .and_then(|(width, height)| Some(Self([side(width)?, side(height)?])))
             .ok_or_else(|| format!("{text:?} is no size; accepted is WxH such as 512x512, up to {LONGEST_SIDE} each."))
@@ -57,7 +61,9 @@ impl FromStr for Size {
 
 impl<'de> Deserialize<'de> for Size {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+        String::deserialize(deserializer)?
+            .parse()
+            .map_err(serde::de::Error::custom)
     }
 }
 
@@ -68,18 +74,32 @@ impl ViewQuery {
         let spp = match self.spp {
             Some(spp) if (1..=most).contains(&spp) => spp,
             Some(spp) => {
-                return Err(Problem::parameter("spp", format!("spp is {spp}.")).accepting(format!("1 to {most}")));
+                return Err(Problem::parameter("spp", format!("spp is {spp}."))
+                    .accepting(format!("1 to {most}")));
             }
             None => {
-                let accuracy = Accuracy { profile: self.profile.unwrap_or_default(), clusters: None };
-                profile(accuracy).map_err(|error| WorkError::from(error).of_query())?.samples_per_pixel
+                let accuracy = Accuracy {
+                    profile: self.profile.unwrap_or_default(),
+                    clusters: None,
+                };
+                profile(accuracy)
+                    .map_err(|error| WorkError::from(error).of_query())?
+                    .samples_per_pixel
             }
         };
         if u64::from(size[0]) * u64::from(size[1]) * u64::from(spp) > MOST_SAMPLES {
-            let detail = format!("{} x {} pixels with {spp} samples each are too much.", size[0], size[1]);
-            return Err(Problem::parameter("spp", detail).accepting(format!("up to {MOST_SAMPLES} samples in all")));
+            let detail = format!(
+                "{} x {} pixels with {spp} samples each are too much.",
+                size[0], size[1]
+            );
+            return Err(Problem::parameter("spp", detail)
+                .accepting(format!("up to {MOST_SAMPLES} samples in all")));
         }
-        Ok(View { scene: self.scene.unwrap_or_default(), size, samples_per_pixel: spp })
+        Ok(View {
+            scene: self.scene.unwrap_or_default(),
+            size,
+            samples_per_pixel: spp,
+        })
     }
 }
 
@@ -132,15 +152,24 @@ async fn draw(
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let view = query.view(app)?;
-    let key = ids::key("preview", &(&thing.id, thing.file.to_string(), &weights, view, format));
+    let key = ids::key(
+        "preview",
+        &(&thing.id, thing.file.to_string(), &weights, view, format),
+    );
     let on = app.clone();
     let compute = move || async move {
         let (works, counter) = (Arc::clone(&on.works), on.metrics.previews_rendered.clone());
-        let drawn = on.bench.run(move || works.preview(&thing.thing, weights.as_ref(), &view, format)).await?;
+        let drawn = on
+            .bench
+            .run(move || works.preview(&thing.thing, weights.as_ref(), &view, format))
+            .await?;
         let bytes = drawn.map_err(super::works::WorkError::of_query)?;
         counter.increment(1);
         Ok(bytes.into())
     };
     let result = app.results.get_or_compute(key, compute).await?;
-    Ok(Answer::result(format.media_type(), result, Keep::ForEver).stage("preview", begun.elapsed()))
+    Ok(
+        Answer::result(format.media_type(), result, Keep::ForEver)
+            .stage("preview", begun.elapsed()),
+    )
 }

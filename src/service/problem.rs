@@ -136,38 +136,88 @@ impl Kind {
     #[must_use]
     pub const fn told(self) -> (&'static str, &'static str, StatusCode) {
         match self {
-            Self::MalformedRequest => ("malformed-request", "The request is not well formed", StatusCode::BAD_REQUEST),
-            Self::InvalidParameter => {
-                ("invalid-parameter", "A parameter of the address is not accepted", StatusCode::BAD_REQUEST)
-            }
-            Self::UnknownAddress => ("unknown-address", "There is nothing at this address", StatusCode::NOT_FOUND),
-            Self::UnknownPaint => ("unknown-paint", "There is no such paint", StatusCode::NOT_FOUND),
-            Self::UnknownBlend => ("unknown-blend", "There is no such blend", StatusCode::NOT_FOUND),
+            Self::MalformedRequest => (
+                "malformed-request",
+                "The request is not well formed",
+                StatusCode::BAD_REQUEST,
+            ),
+            Self::InvalidParameter => (
+                "invalid-parameter",
+                "A parameter of the address is not accepted",
+                StatusCode::BAD_REQUEST,
+            ),
+            Self::UnknownAddress => (
+                "unknown-address",
+                "There is nothing at this address",
+                StatusCode::NOT_FOUND,
+            ),
+            Self::UnknownPaint => (
+                "unknown-paint",
+                "There is no such paint",
+                StatusCode::NOT_FOUND,
+            ),
+            Self::UnknownBlend => (
+                "unknown-blend",
+                "There is no such blend",
+                StatusCode::NOT_FOUND,
+            ),
             Self::UnknownJob => ("unknown-job", "There is no such job", StatusCode::NOT_FOUND),
-            Self::NoMeasurement => ("no-measurement", "This paint has no measurement", StatusCode::NOT_FOUND),
-            Self::MethodNotAllowed => {
-                ("method-not-allowed", "This address does not take this method", StatusCode::METHOD_NOT_ALLOWED)
-            }
-            Self::RequestTimeout => {
-                ("request-timeout", "The request did not come in time", StatusCode::REQUEST_TIMEOUT)
-            }
+            Self::NoMeasurement => (
+                "no-measurement",
+                "This paint has no measurement",
+                StatusCode::NOT_FOUND,
+            ),
+            Self::MethodNotAllowed => (
+                "method-not-allowed",
+                "This address does not take this method",
+                StatusCode::METHOD_NOT_ALLOWED,
+            ),
+            Self::RequestTimeout => (
+                "request-timeout",
+                "The request did not come in time",
+                StatusCode::REQUEST_TIMEOUT,
+            ),
             Self::JobEnded => ("job-ended", "The job has ended", StatusCode::CONFLICT),
-            Self::JobCancelled => ("job-cancelled", "The job was cancelled", StatusCode::CONFLICT),
-            Self::TooLarge => ("too-large", "The request is too large", StatusCode::PAYLOAD_TOO_LARGE),
-            Self::UnsupportedMediaType => {
-                ("unsupported-media-type", "Bodies of this type are not read", StatusCode::UNSUPPORTED_MEDIA_TYPE)
-            }
-            Self::InvalidValue => {
-                ("invalid-value", "A value in the body is not accepted", StatusCode::UNPROCESSABLE_ENTITY)
-            }
-            Self::UnusableMeasurement => {
-                ("unusable-measurement", "The upload cannot become a paint", StatusCode::UNPROCESSABLE_ENTITY)
-            }
-            Self::Internal => ("internal", "Something went wrong on our side", StatusCode::INTERNAL_SERVER_ERROR),
-            Self::Overloaded => {
-                ("overloaded", "More work waits than can be done soon", StatusCode::SERVICE_UNAVAILABLE)
-            }
-            Self::StorageFull => ("storage-full", "There is no room to store this", StatusCode::INSUFFICIENT_STORAGE),
+            Self::JobCancelled => (
+                "job-cancelled",
+                "The job was cancelled",
+                StatusCode::CONFLICT,
+            ),
+            Self::TooLarge => (
+                "too-large",
+                "The request is too large",
+                StatusCode::PAYLOAD_TOO_LARGE,
+            ),
+            Self::UnsupportedMediaType => (
+                "unsupported-media-type",
+                "Bodies of this type are not read",
+                StatusCode::UNSUPPORTED_MEDIA_TYPE,
+            ),
+            Self::InvalidValue => (
+                "invalid-value",
+                "A value in the body is not accepted",
+                StatusCode::UNPROCESSABLE_ENTITY,
+            ),
+            Self::UnusableMeasurement => (
+                "unusable-measurement",
+                "The upload cannot become a paint",
+                StatusCode::UNPROCESSABLE_ENTITY,
+            ),
+            Self::Internal => (
+                "internal",
+                "Something went wrong on our side",
+                StatusCode::INTERNAL_SERVER_ERROR,
+            ),
+            Self::Overloaded => (
+                "overloaded",
+                "More work waits than can be done soon",
+                StatusCode::SERVICE_UNAVAILABLE,
+            ),
+            Self::StorageFull => (
+                "storage-full",
+                "There is no room to store this",
+                StatusCode::INSUFFICIENT_STORAGE,
+            ),
         }
     }
 
@@ -182,7 +232,12 @@ impl Problem {
     /// A problem of this kind.
     #[must_use]
     pub fn new(kind: Kind, detail: impl Into<String>) -> Self {
-        Self { kind, detail: detail.into(), field: None, accepted: None }
+        Self {
+            kind,
+            detail: detail.into(),
+            field: None,
+            accepted: None,
+        }
     }
 
     /// A parameter in the query that is not accepted.
@@ -201,13 +256,19 @@ impl Problem {
     #[must_use]
     pub fn internal(cause: impl std::fmt::Display) -> Self {
         tracing::error!(%cause, "internal error");
-        Self::new(Kind::Internal, "The request could not be answered. It may work when it is made again.")
+        Self::new(
+            Kind::Internal,
+            "The request could not be answered. It may work when it is made again.",
+        )
     }
 
     /// Too much work waits.
     #[must_use]
     pub fn overloaded() -> Self {
-        Self::new(Kind::Overloaded, "Too many requests wait for the processors. Ask again a little later.")
+        Self::new(
+            Kind::Overloaded,
+            "Too many requests wait for the processors. Ask again a little later.",
+        )
     }
 
     /// Says where the offending field stands.
@@ -250,8 +311,16 @@ impl Problem {
     /// The problem of a document that was stored.
     #[must_use]
     pub fn of_document(document: ProblemDocument) -> Self {
-        let kind = Kind::ALL.into_iter().find(|kind| kind.address() == document.kind).unwrap_or(Kind::Internal);
-        Self { kind, detail: document.detail, field: document.place.zip(document.pointer), accepted: document.accepted }
+        let kind = Kind::ALL
+            .into_iter()
+            .find(|kind| kind.address() == document.kind)
+            .unwrap_or(Kind::Internal);
+        Self {
+            kind,
+            detail: document.detail,
+            field: document.place.zip(document.pointer),
+            accepted: document.accepted,
+        }
     }
 }
 
@@ -259,7 +328,10 @@ impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         if error.is_full() {
             tracing::error!(%error, "storage is full");
-            return Self::new(Kind::StorageFull, "The disk of this service is full. Nothing was kept of the request.");
+            return Self::new(
+                Kind::StorageFull,
+                "The disk of this service is full. Nothing was kept of the request.",
+            );
         }
         Self::internal(error)
     }
@@ -269,7 +341,10 @@ impl WorkError {
     /// The same error without the name of the file that an upload was kept in.
     #[must_use]
     pub fn without(self, file: &str) -> Self {
-        Self { message: self.message.replace(file, "the upload"), ..self }
+        Self {
+            message: self.message.replace(file, "the upload"),
+            ..self
+        }
     }
 
     /// The problem with an upload, or with the query that came with it.
@@ -296,7 +371,10 @@ impl WorkError {
     pub fn of_body(self) -> Problem {
         match (self.fault, &self.field) {
             (Fault::Internal, _) => Problem::internal(self.message),
-            (_, Some(field)) => Problem::value(format!("/{}", field.trim_start_matches('-')), &*self.message),
+            (_, Some(field)) => Problem::value(
+                format!("/{}", field.trim_start_matches('-')),
+                &*self.message,
+            ),
             (_, None) => Problem::new(Kind::InvalidValue, self.message),
         }
     }
@@ -317,7 +395,10 @@ pub fn finish(mut response: Response, request_id: &str) -> Response {
     if !status.is_client_error() && !status.is_server_error() {
         return response;
     }
-    let problem = response.extensions_mut().remove::<Problem>().unwrap_or_else(|| of_status(&response));
+    let problem = response
+        .extensions_mut()
+        .remove::<Problem>()
+        .unwrap_or_else(|| of_status(&response));
     let document = problem.document(Some(request_id));
     let body = serde_json::to_vec(&document).unwrap_or_default();
     let mut finished = HttpResponse::new(Body::from(body));
@@ -339,17 +420,27 @@ pub fn finish(mut response: Response, request_id: &str) -> Response {
 /// What a refusal means that came without a problem: from the router, or from the HTTP library.
 fn of_status(response: &Response) -> Problem {
     match response.status() {
-        StatusCode::NOT_FOUND => Problem::new(Kind::UnknownAddress, "There is nothing at this address.")
-            .accepting("the addresses listed in /openapi.json"),
-        StatusCode::METHOD_NOT_ALLOWED => {
-            Problem::new(Kind::MethodNotAllowed, "This address does not take this method.")
+        StatusCode::NOT_FOUND => {
+            Problem::new(Kind::UnknownAddress, "There is nothing at this address.")
+                .accepting("the addresses listed in /openapi.json")
         }
-        StatusCode::REQUEST_TIMEOUT => Problem::new(Kind::RequestTimeout, "The request did not come in time."),
-        StatusCode::PAYLOAD_TOO_LARGE => Problem::new(Kind::TooLarge, "The request's body is too large."),
-        StatusCode::UNSUPPORTED_MEDIA_TYPE => {
-            Problem::new(Kind::UnsupportedMediaType, "A body of this type is not read here.")
+        StatusCode::METHOD_NOT_ALLOWED => Problem::new(
+            Kind::MethodNotAllowed,
+            "This address does not take this method.",
+        ),
+        StatusCode::REQUEST_TIMEOUT => {
+            Problem::new(Kind::RequestTimeout, "The request did not come in time.")
         }
-        status if status.is_client_error() => Problem::new(Kind::MalformedRequest, "The request was refused."),
+        StatusCode::PAYLOAD_TOO_LARGE => {
+            Problem::new(Kind::TooLarge, "The request's body is too large.")
+        }
+        StatusCode::UNSUPPORTED_MEDIA_TYPE => Problem::new(
+            Kind::UnsupportedMediaType,
+            "A body of this type is not read here.",
+        ),
+        status if status.is_client_error() => {
+            Problem::new(Kind::MalformedRequest, "The request was refused.")
+        }
         status => Problem::internal(format!("a response of status {status} without a problem")),
     }
 }
@@ -371,6 +462,9 @@ mod tests {
     fn a_problem_reads_back_from_its_document() {
         let problem = Problem::value("/paints/1", "no such paint").accepting("ids");
         let text = serde_json::to_string(&problem.document(None)).expect("serialises");
-        assert_eq!(Problem::of_document(serde_json::from_str(&text).expect("reads back")), problem);
+        assert_eq!(
+            Problem::of_document(serde_json::from_str(&text).expect("reads back")),
+            problem
+        );
     }
 }

@@ -33,22 +33,37 @@ impl std::error::Error for Refusal {}
 
 impl de::Error for Refusal {
     fn custom<T: Display>(message: T) -> Self {
-        Self { name: None, message: message.to_string(), accepted: None }
+        Self {
+            name: None,
+            message: message.to_string(),
+            accepted: None,
+        }
     }
 
     fn missing_field(field: &'static str) -> Self {
-        Self { name: Some(field.to_owned()), message: format!("The parameter {field} is missing."), accepted: None }
+        Self {
+            name: Some(field.to_owned()),
+            message: format!("The parameter {field} is missing."),
+            accepted: None,
+        }
     }
 
     fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
         let message = format!("{variant:?} is not offered.");
-        Self { name: None, message, accepted: Some(expected.join(", ")) }
+        Self {
+            name: None,
+            message,
+            accepted: Some(expected.join(", ")),
+        }
     }
 }
 
 impl Refusal {
     fn of(self, name: &str) -> Self {
-        Self { name: Some(self.name.unwrap_or_else(|| name.to_owned())), ..self }
+        Self {
+            name: Some(self.name.unwrap_or_else(|| name.to_owned())),
+            ..self
+        }
     }
 
     fn problem(self) -> Problem {
@@ -70,8 +85,11 @@ pub fn pairs(query: &str) -> Result<Vec<Pair>, Problem> {
         let (name, value) = part.split_once('=').unwrap_or((part, ""));
         let (name, value) = (decode(name)?, decode(value)?);
         if pairs.iter().any(|(other, _)| *other == name) {
-            return Err(Problem::parameter(&name, format!("The parameter {name} stands twice in the query."))
-                .accepting("each parameter once"));
+            return Err(Problem::parameter(
+                &name,
+                format!("The parameter {name} stands twice in the query."),
+            )
+            .accepting("each parameter once"));
         }
         pairs.push((name, value));
     }
@@ -79,8 +97,12 @@ pub fn pairs(query: &str) -> Result<Vec<Pair>, Problem> {
 }
 
 fn decode(text: &str) -> Result<String, Problem> {
-    let broken =
-        || Problem::new(Kind::MalformedRequest, format!("{text:?} in the query is not percent-encoded UTF-8."));
+    let broken = || {
+        Problem::new(
+            Kind::MalformedRequest,
+            format!("{text:?} in the query is not percent-encoded UTF-8."),
+        )
+    };
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.bytes();
     while let Some(byte) = rest.next() {
@@ -99,16 +121,31 @@ fn decode(text: &str) -> Result<String, Problem> {
 
 /// Refuses parameters whose names are none of these.
 pub fn refuse_unknown(pairs: &[Pair], known: &[&str]) -> Result<(), Problem> {
-    let Some((name, _)) = pairs.iter().find(|(name, _)| !known.contains(&name.as_str())) else { return Ok(()) };
+    let Some((name, _)) = pairs
+        .iter()
+        .find(|(name, _)| !known.contains(&name.as_str()))
+    else {
+        return Ok(());
+    };
     let problem = Problem::parameter(name, format!("There is no parameter {name:?} here."));
-    Err(problem.accepting(if known.is_empty() { "no parameters".to_owned() } else { known.join(", ") }))
+    Err(problem.accepting(if known.is_empty() {
+        "no parameters".to_owned()
+    } else {
+        known.join(", ")
+    }))
 }
 
 /// Reads the parameters that `T` has; others are left to others.
 pub fn read<T: DeserializeOwned>(pairs: &[Pair]) -> Result<T, Problem> {
     let names = names::<T>();
-    let own = pairs.iter().filter(|(name, _)| names.contains(&name.as_str()));
-    T::deserialize(MapAccessDeserializer::new(Own { rest: own, value: None })).map_err(Refusal::problem)
+    let own = pairs
+        .iter()
+        .filter(|(name, _)| names.contains(&name.as_str()));
+    T::deserialize(MapAccessDeserializer::new(Own {
+        rest: own,
+        value: None,
+    }))
+    .map_err(Refusal::problem)
 }
 
 /// The parameters of one struct. Whatever a value is refused for carries its name.
@@ -120,15 +157,24 @@ struct Own<'a, I> {
 impl<'de, 'a, I: Iterator<Item = &'a Pair>> MapAccess<'de> for Own<'a, I> {
     type Error = Refusal;
 
-    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Refusal> {
-        let Some((name, text)) = self.rest.next() else { return Ok(None) };
+    fn next_key_seed<K: DeserializeSeed<'de>>(
+        &mut self,
+        seed: K,
+    ) -> Result<Option<K::Value>, Refusal> {
+        let Some((name, text)) = self.rest.next() else {
+            return Ok(None);
+        };
         self.value = Some(Text { name, text });
-        seed.deserialize(name.as_str().into_deserializer()).map(Some)
+        seed.deserialize(name.as_str().into_deserializer())
+            .map(Some)
     }
 
     fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
-        let Some(value) = self.value.take() else { return Err(de::Error::custom("a value before its name")) };
-        seed.deserialize(value).map_err(|error| error.of(value.name))
+        let Some(value) = self.value.take() else {
+            return Err(de::Error::custom("a value before its name"));
+        };
+        seed.deserialize(value)
+            .map_err(|error| error.of(value.name))
     }
 }
 
@@ -183,7 +229,11 @@ impl IntoDeserializer<'_, Refusal> for Text<'_> {
 impl Text<'_> {
     fn refuse(&self, accepted: &str) -> Refusal {
         let message = format!("{} is {:?}.", self.name, self.text);
-        Refusal { name: Some(self.name.to_owned()), message, accepted: Some(accepted.to_owned()) }
+        Refusal {
+            name: Some(self.name.to_owned()),
+            message,
+            accepted: Some(accepted.to_owned()),
+        }
     }
 
     fn number<T: std::str::FromStr>(&self, accepted: &str) -> Result<T, Refusal> {
@@ -231,12 +281,19 @@ impl<'de> de::Deserializer<'de> for Text<'_> {
         visitor.visit_some(self)
     }
 
-    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Refusal> {
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Refusal> {
         visitor.visit_newtype_struct(self)
     }
 
     fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        let parts = self.text.split(',').map(|text| Text { name: self.name, text });
+        let parts = self.text.split(',').map(|text| Text {
+            name: self.name,
+            text,
+        });
         visitor.visit_seq(SeqDeserializer::new(parts))
     }
 
@@ -291,9 +348,18 @@ mod tests {
 
     #[test]
     fn a_query_becomes_a_struct() {
-        let asked = ask("weights=-2,3e0&scene=flat-panel&name=m%C3%A9tal+blue&spp=16").expect("is accepted");
+        let asked = ask("weights=-2,3e0&scene=flat-panel&name=m%C3%A9tal+blue&spp=16")
+            .expect("is accepted");
         let name = Some("métal blue".to_owned());
-        assert_eq!(asked, Asked { weights: Some(vec![-2.0, 3.0]), scene: Some(Scene::FlatPanel), spp: Some(16), name });
+        assert_eq!(
+            asked,
+            Asked {
+                weights: Some(vec![-2.0, 3.0]),
+                scene: Some(Scene::FlatPanel),
+                spp: Some(16),
+                name
+            }
+        );
         assert_eq!(ask("").expect("all are optional").weights, None);
     }
 

@@ -79,13 +79,31 @@ async fn realise(
     query: ProfileQuery,
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
-    let accuracy = Accuracy { profile: query.profile.unwrap_or_default(), clusters: None };
-    let key = ids::key("realisation", &(&thing.id, thing.file.to_string(), &weights, format, accuracy));
+    let accuracy = Accuracy {
+        profile: query.profile.unwrap_or_default(),
+        clusters: None,
+    };
+    let key = ids::key(
+        "realisation",
+        &(
+            &thing.id,
+            thing.file.to_string(),
+            &weights,
+            format,
+            accuracy,
+        ),
+    );
     let name = format!("{}.{}", thing.id, format.ending());
     let on = app.clone();
     let compute = move || async move {
-        let (works, counter) = (Arc::clone(&on.works), on.metrics.realisations_computed.clone());
-        let made = on.bench.run(move || works.realise(&thing.thing, weights.as_ref(), format, accuracy)).await?;
+        let (works, counter) = (
+            Arc::clone(&on.works),
+            on.metrics.realisations_computed.clone(),
+        );
+        let made = on
+            .bench
+            .run(move || works.realise(&thing.thing, weights.as_ref(), format, accuracy))
+            .await?;
         let bytes = made.map_err(super::works::WorkError::of_query)?;
         counter.increment(1);
         Ok(bytes.into())

@@ -86,7 +86,9 @@ impl Jobs {
     }
 
     fn under_way(&self) -> MutexGuard<'_, HashMap<String, Arc<UnderWay>>> {
-        self.under_way.lock().unwrap_or_else(PoisonError::into_inner)
+        self.under_way
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     fn find(&self, id: &str) -> Option<Arc<UnderWay>> {
@@ -105,9 +107,19 @@ impl Jobs {
 /// # Errors
 ///
 /// [`Problem`] when too many are under way or the store fails.
-pub async fn submit(app: &App, kind: JobKind, subject: &str, request: &impl Serialize) -> Result<String, Problem> {
+pub async fn submit(
+    app: &App,
+    kind: JobKind,
+    subject: &str,
+    request: &impl Serialize,
+) -> Result<String, Problem> {
     let request = serde_json::to_string(request).map_err(Problem::internal)?;
-    let job = NewJob { id: ids::random("j_"), kind, subject: subject.to_owned(), request };
+    let job = NewJob {
+        id: ids::random("j_"),
+        kind,
+        subject: subject.to_owned(),
+        request,
+    };
     let _one_at_a_time = app.jobs.submitting.lock().await;
     if app.jobs.under_way().len() >= app.jobs.most {
         return Err(Problem::overloaded());
@@ -128,7 +140,10 @@ pub async fn submit(app: &App, kind: JobKind, subject: &str, request: &impl Seri
 pub async fn resume(app: &App) -> Result<(), Problem> {
     for job in app.catalogue.unfinished_jobs().await? {
         if job.attempts >= MOST_ATTEMPTS {
-            let given_up = Problem::new(Kind::Internal, "The service ended several times over this job.");
+            let given_up = Problem::new(
+                Kind::Internal,
+                "The service ended several times over this job.",
+            );
             end(app, &job, JobState::Failed, Some(&given_up)).await?;
         } else {
             start(app, job);
@@ -138,18 +153,33 @@ pub async fn resume(app: &App) -> Result<(), Problem> {
 }
 
 fn start(app: &App, job: JobRecord) {
-    let under_way =
-        Arc::new(UnderWay { told: watch::Sender::new(document(&job)), cancelled: watch::Sender::new(false), job });
-    app.jobs.under_way().insert(under_way.job.id.clone(), Arc::clone(&under_way));
+    let under_way = Arc::new(UnderWay {
+        told: watch::Sender::new(document(&job)),
+        cancelled: watch::Sender::new(false),
+        job,
+    });
+    app.jobs
+        .under_way()
+        .insert(under_way.job.id.clone(), Arc::clone(&under_way));
     tokio::spawn(run(app.clone(), under_way));
 }
 
 async fn run(app: App, under_way: Arc<UnderWay>) {
     let job = &under_way.job;
-    let last = match AssertUnwindSafe(run_to_end(&app, &under_way)).catch_unwind().await {
+    let last = match AssertUnwindSafe(run_to_end(&app, &under_way))
+        .catch_unwind()
+        .await
+    {
         Ok(Ok(ended)) => ended,
         Ok(Err(problem)) => ended_badly(&app, job, problem).await,
-        Err(_) => ended_badly(&app, job, Problem::internal(format!("job {} panicked", job.id))).await,
+        Err(_) => {
+            ended_badly(
+                &app,
+                job,
+                Problem::internal(format!("job {} panicked", job.id)),
+            )
+            .await
+        }
     };
     app.jobs.under_way().remove(&job.id);
     if let Some(last) = last {
@@ -176,14 +206,18 @@ async fn run_to_end(app: &App, under_way: &Arc<UnderWay>) -> Result<Option<JobDo
         return end(app, job, JobState::Cancelled, None).await.map(Some);
     }
     app.catalogue.begin_job(&job.id).await?;
-    under_way.told.send_modify(|told| told.state = JobState::Running);
+    under_way
+        .told
+        .send_modify(|told| told.state = JobState::Running);
     let ended = match job.kind {
         JobKind::Ingest => paints::ingest(app, under_way).await?,
         JobKind::Blend => blends::blend(app, under_way).await?,
     };
     match ended {
         Ok(()) => end(app, job, JobState::Done, None).await.map(Some),
-        Err(CalledOff) if under_way.is_cancelled() => end(app, job, JobState::Cancelled, None).await.map(Some),
+        Err(CalledOff) if under_way.is_cancelled() => {
+            end(app, job, JobState::Cancelled, None).await.map(Some)
+        }
         Err(CalledOff) => {
             // The service goes down: the next one begins it again.
             app.catalogue.return_job(&job.id).await?;
@@ -193,10 +227,21 @@ async fn run_to_end(app: &App, under_way: &Arc<UnderWay>) -> Result<Option<JobDo
 }
 
 /// Records the end of a job, and lets go of an upload that came to nothing.
-async fn end(app: &App, job: &JobRecord, state: JobState, problem: Option<&Problem>) -> Result<JobDocument, Problem> {
+async fn end(
+    app: &App,
+    job: &JobRecord,
+    state: JobState,
+    problem: Option<&Problem>,
+) -> Result<JobDocument, Problem> {
     let problem = problem.map(|problem| problem.document(None));
-    let stored = problem.as_ref().map(serde_json::to_string).transpose().map_err(Problem::internal)?;
-    app.catalogue.end_job(&job.id, state, stored.as_deref()).await?;
+    let stored = problem
+        .as_ref()
+        .map(serde_json::to_string)
+        .transpose()
+        .map_err(Problem::internal)?;
+    app.catalogue
+        .end_job(&job.id, state, stored.as_deref())
+        .await?;
     if job.kind == JobKind::Ingest && state != JobState::Done {
         paints::forget_upload(app, job).await?;
     }
@@ -221,12 +266,24 @@ fn document(job: &JobRecord) -> JobDocument {
     JobDocument {
         id: job.id.clone(),
         kind: job.kind,
-        state: if job.state.is_final() { job.state } else { JobState::Queued },
+        state: if job.state.is_final() {
+            job.state
+        } else {
+            JobState::Queued
+        },
         progress: if done { 1.0 } else { 0.0 },
-        stage: if job.state.is_final() { job.state.word() } else { "waiting" }.to_owned(),
+        stage: if job.state.is_final() {
+            job.state.word()
+        } else {
+            "waiting"
+        }
+        .to_owned(),
         seconds_left: None,
         result: done.then(|| format!("{made}{}", job.subject)),
-        problem: job.problem.as_deref().and_then(|problem| serde_json::from_str(problem).ok()),
+        problem: job
+            .problem
+            .as_deref()
+            .and_then(|problem| serde_json::from_str(problem).ok()),
     }
 }
 
@@ -240,7 +297,8 @@ pub async fn look_up(app: &App, id: &str) -> Result<JobDocument, Problem> {
         return Ok(under_way.told.borrow().clone());
     }
     let unknown = || {
-        Problem::new(Kind::UnknownJob, format!("There is no job {id:?}.")).accepting("the address in a 202's Location")
+        Problem::new(Kind::UnknownJob, format!("There is no job {id:?}."))
+            .accepting("the address in a 202's Location")
     };
     let job = app.catalogue.job(id).await?.ok_or_else(unknown)?;
     Ok(document(&job))
@@ -267,7 +325,9 @@ pub async fn wait_for(app: &App, id: &str, time: Duration) -> Result<JobDocument
 
 /// What a job has to tell from now on; `None` when it has ended.
 pub fn follow(app: &App, id: &str) -> Option<watch::Receiver<JobDocument>> {
-    app.jobs.find(id).map(|under_way| under_way.told.subscribe())
+    app.jobs
+        .find(id)
+        .map(|under_way| under_way.told.subscribe())
 }
 
 /// Calls a job off and says how it ended.
@@ -283,7 +343,10 @@ pub async fn cancel(app: &App, id: &str) -> Result<JobDocument, Problem> {
     let job = wait_for(app, id, Duration::from_secs(2)).await?;
     match job.state {
         JobState::Done | JobState::Failed => {
-            let detail = format!("The job is {} already, it cannot be cancelled.", job.state.word());
+            let detail = format!(
+                "The job is {} already, it cannot be cancelled.",
+                job.state.word()
+            );
             Err(Problem::new(Kind::JobEnded, detail).accepting("jobs that are queued or running"))
         }
         _ => Ok(job),
@@ -308,7 +371,8 @@ impl UnderWay {
 
     /// Says what is being done now.
     pub fn stage(&self, stage: &str) {
-        self.told.send_modify(|told| stage.clone_into(&mut told.stage));
+        self.told
+            .send_modify(|told| stage.clone_into(&mut told.stage));
     }
 
     /// Whether somebody called the job off.
@@ -319,7 +383,11 @@ impl UnderWay {
 
     /// Returns once somebody called the job off.
     async fn called_off(&self) {
-        let _ = self.cancelled.subscribe().wait_for(|&cancelled| cancelled).await;
+        let _ = self
+            .cancelled
+            .subscribe()
+            .wait_for(|&cancelled| cancelled)
+            .await;
     }
 
     /// Computes one stage of the job. The work hears of a call through its progress.
@@ -341,7 +409,10 @@ impl UnderWay {
             }
             this.tell(share.clamp(0.0, 1.0), begun.elapsed());
         };
-        app.jobs.bench.run_or_call_off(move || work(&progress)).await
+        app.jobs
+            .bench
+            .run_or_call_off(move || work(&progress))
+            .await
     }
 
     /// Tells the share done, in steps that are worth a message.

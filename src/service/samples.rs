@@ -19,8 +19,11 @@ pub async fn load_samples(app: &App) -> Result<(), Problem> {
         if app.has_paint(&id).await? {
             continue;
         }
-        let paint = bench.run(move || sample.build(&Profile::standard(), &|_| ())).await?;
-        app.keep_paint(&id, paint.map_err(Problem::internal)?, None).await?;
+        let paint = bench
+            .run(move || sample.build(&Profile::standard(), &|_| ()))
+            .await?;
+        app.keep_paint(&id, paint.map_err(Problem::internal)?, None)
+            .await?;
     }
     Ok(())
 }

@@ -18,7 +18,9 @@ use super::app::App;
 use super::envelope::envelope;
 use super::extract::JSON_BYTES;
 use super::works::Works;
-use super::{ServiceConfig, blends, docs, home, jobs, operations, paints, previews, realisations, runner};
+use super::{
+    ServiceConfig, blends, docs, home, jobs, operations, paints, previews, realisations, runner,
+};
 use crate::store::StoreError;
 
 /// Why a service did not start, or did not go on.
@@ -60,11 +62,17 @@ pub fn router(app: App) -> Router {
         .route("/v1/paints/{id}", get(paints::show).delete(paints::delete))
         .route("/v1/paints/{id}/paint", get(paints::file))
         .route("/v1/paints/{id}/measurement", get(paints::measurement))
-        .route("/v1/paints/{id}/realisation.{format}", get(realisations::of_paint))
+        .route(
+            "/v1/paints/{id}/realisation.{format}",
+            get(realisations::of_paint),
+        )
         .route("/v1/paints/{id}/preview.{format}", get(previews::of_paint))
         .route("/v1/blends", axum::routing::post(blends::create))
         .route("/v1/blends/{id}", get(blends::show))
-        .route("/v1/blends/{id}/realisation.{format}", get(realisations::of_blend))
+        .route(
+            "/v1/blends/{id}/realisation.{format}",
+            get(realisations::of_blend),
+        )
         .route("/v1/blends/{id}/preview.{format}", get(previews::of_blend))
         .route("/v1/jobs/{id}", get(jobs::show).delete(jobs::cancel))
         .route("/v1/jobs/{id}/events", get(jobs::events))
@@ -93,7 +101,10 @@ pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = (
     let connections = Arc::new(Semaphore::new(app.config.most_connections));
     let graceful = GracefulShutdown::new();
     let mut builder = Builder::new(TokioExecutor::new());
-    builder.http1().timer(TokioTimer::new()).header_read_timeout(app.config.header_time);
+    builder
+        .http1()
+        .timer(TokioTimer::new())
+        .header_read_timeout(app.config.header_time);
 
     let mut stop = std::pin::pin!(stop);
     loop {
@@ -105,7 +116,10 @@ pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = (
             stream = accept(&listener) => stream,
             () = &mut stop => break,
         };
-        let connection = builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router.clone()));
+        let connection = builder.serve_connection(
+            TokioIo::new(stream),
+            TowerToHyperService::new(router.clone()),
+        );
         let connection = graceful.watch(connection.into_owned());
         tokio::spawn(async move {
             // How a connection ends is the caller's business.

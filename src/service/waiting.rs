@@ -33,8 +33,14 @@ impl<S: Send + Sync> FromRequestParts<S> for Prefer {
     type Rejection = Infallible;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
-        let texts = parts.headers.get_all(PREFER).iter().filter_map(|value| value.to_str().ok());
-        Ok(Self { wait: texts.flat_map(|text| text.split([',', ';'])).find_map(wait) })
+        let texts = parts
+            .headers
+            .get_all(PREFER)
+            .iter()
+            .filter_map(|value| value.to_str().ok());
+        Ok(Self {
+            wait: texts.flat_map(|text| text.split([',', ';'])).find_map(wait),
+        })
     }
 }
 
@@ -43,7 +49,12 @@ fn wait(preference: &str) -> Option<Duration> {
     let (name, value) = preference.split_once('=').unwrap_or((preference, ""));
     match name.trim().to_ascii_lowercase().as_str() {
         "respond-async" => Some(Duration::ZERO),
-        "wait" => value.trim().trim_matches('"').parse().ok().map(|seconds| Duration::from_secs(seconds).min(LONGEST)),
+        "wait" => value
+            .trim()
+            .trim_matches('"')
+            .parse()
+            .ok()
+            .map(|seconds| Duration::from_secs(seconds).min(LONGEST)),
         _ => None,
     }
 }
@@ -73,14 +84,19 @@ impl Prefer {
                 .location(address),
             JobState::Failed => {
                 let told = job.problem.map(Problem::of_document);
-                return Err(told.unwrap_or_else(|| Problem::internal(format!("job {} failed without a word", job.id))));
+                return Err(told.unwrap_or_else(|| {
+                    Problem::internal(format!("job {} failed without a word", job.id))
+                }));
             }
             JobState::Cancelled => {
-                return Err(Problem::new(Kind::JobCancelled, "Somebody cancelled this while it was waited for."));
+                return Err(Problem::new(
+                    Kind::JobCancelled,
+                    "Somebody cancelled this while it was waited for.",
+                ));
             }
-            JobState::Queued | JobState::Running => {
-                Answer::json(&job, Keep::Never).status(StatusCode::ACCEPTED).location(&format!("/v1/jobs/{}", job.id))
-            }
+            JobState::Queued | JobState::Running => Answer::json(&job, Keep::Never)
+                .status(StatusCode::ACCEPTED)
+                .location(&format!("/v1/jobs/{}", job.id)),
         };
         let answer = answer.stage("job", waited);
         let applied = match self.wait {

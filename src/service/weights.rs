@@ -49,23 +49,37 @@ impl WeightQuery {
     /// [`Problem`] that names the parameter and how many numbers it needs.
     pub fn for_blend(self, names: &[String]) -> Result<RealisationWeights, Problem> {
         let weights = self.weights(names)?;
-        let own = |field: &str, list: Option<Vec<f64>>| list.map(|list| checked(field, list, names)).transpose();
+        let own = |field: &str, list: Option<Vec<f64>>| {
+            list.map(|list| checked(field, list, names)).transpose()
+        };
         let base = own("base", self.base)?;
         let flake_lightness = own("flake_lightness", self.flake_lightness)?;
         let flake_color = own("flake_color", self.flake_color)?;
         let saturation = self.flake_saturation.unwrap_or(1.0);
         if saturation.abs() > MOST {
-            return Err(Problem::parameter("flake_saturation", format!("flake_saturation is {saturation}."))
-                .accepting("a number from -1e12 to 1e12"));
+            return Err(Problem::parameter(
+                "flake_saturation",
+                format!("flake_saturation is {saturation}."),
+            )
+            .accepting("a number from -1e12 to 1e12"));
         }
         let parts = [&base, &flake_lightness, &flake_color];
         let weights = match weights {
             Some(weights) => weights,
             // All that weights are for have weights of their own.
             None if parts.iter().all(|part| part.is_some()) => base.clone().unwrap_or_default(),
-            None => return Err(Problem::parameter("weights", "The weights are missing.").accepting(needed(names))),
+            None => {
+                return Err(Problem::parameter("weights", "The weights are missing.")
+                    .accepting(needed(names)));
+            }
         };
-        Ok(RealisationWeights { weights, base, flake_lightness, flake_color, flake_saturation: saturation + 0.0 })
+        Ok(RealisationWeights {
+            weights,
+            base,
+            flake_lightness,
+            flake_color,
+            flake_saturation: saturation + 0.0,
+        })
     }
 
     fn weights(&self, names: &[String]) -> Result<Option<Vec<f64>>, Problem> {
@@ -83,9 +97,17 @@ impl WeightQuery {
             return Ok(None);
         }
         if let Some(k) = (0..greek.len()).find(|&k| greek[k].is_some() != (k < names.len())) {
-            let what = if greek[k].is_some() { "is one too many" } else { "is missing" };
+            let what = if greek[k].is_some() {
+                "is one too many"
+            } else {
+                "is missing"
+            };
             let detail = format!("{} {what}.", GREEK[k]);
-            let accepted = format!("{}, for {}", GREEK[..names.len().min(GREEK.len())].join(", "), names.join(", "));
+            let accepted = format!(
+                "{}, for {}",
+                GREEK[..names.len().min(GREEK.len())].join(", "),
+                names.join(", ")
+            );
             return Err(Problem::parameter(GREEK[k], detail).accepting(accepted));
         }
         let list: Vec<f64> = greek.into_iter().flatten().collect();
@@ -97,16 +119,25 @@ impl WeightQuery {
 }
 
 fn needed(names: &[String]) -> String {
-    format!("{} numbers separated by commas, for {}", names.len(), names.join(", "))
+    format!(
+        "{} numbers separated by commas, for {}",
+        names.len(),
+        names.join(", ")
+    )
 }
 
 fn too_far(field: &str, value: f64) -> Problem {
-    Problem::parameter(field, format!("{field} holds {value}.")).accepting("numbers from -1e12 to 1e12")
+    Problem::parameter(field, format!("{field} holds {value}."))
+        .accepting("numbers from -1e12 to 1e12")
 }
 
 fn checked(field: &str, list: Vec<f64>, names: &[String]) -> Result<Vec<f64>, Problem> {
     if list.len() != names.len() {
-        let detail = format!("{field} has {} numbers, the blend {} paints.", list.len(), names.len());
+        let detail = format!(
+            "{field} has {} numbers, the blend {} paints.",
+            list.len(),
+            names.len()
+        );
         return Err(Problem::parameter(field, detail).accepting(needed(names)));
     }
     match list.iter().find(|w| w.abs() > MOST) {
@@ -126,23 +157,73 @@ mod tests {
 
     #[test]
     fn greek_letters_and_a_list_say_the_same() {
-        let greek = WeightQuery { alpha: Some(0.25), beta: Some(-0.0), ..WeightQuery::default() };
-        let list = WeightQuery { weights: Some(vec![0.25, 0.0]), ..WeightQuery::default() };
-        let (greek, list) = (greek.for_blend(&names()).expect("accepted"), list.for_blend(&names()).expect("accepted"));
-        assert_eq!(serde_json::to_string(&greek).expect("JSON"), serde_json::to_string(&list).expect("JSON"));
+        let greek = WeightQuery {
+            alpha: Some(0.25),
+            beta: Some(-0.0),
+            ..WeightQuery::default()
+        };
+        let list = WeightQuery {
+            weights: Some(vec![0.25, 0.0]),
+            ..WeightQuery::default()
+        };
+        let (greek, list) = (
+            greek.for_blend(&names()).expect("accepted"),
+            list.for_blend(&names()).expect("accepted"),
+        );
+        assert_eq!(
+            serde_json::to_string(&greek).expect("JSON"),
+            serde_json::to_string(&list).expect("JSON")
+        );
     }
 
     #[test]
     fn what_does_not_fit_the_blend_is_named() {
         let cases = [
             (WeightQuery::default(), "/weights"),
-            (WeightQuery { weights: Some(vec![1.0]), ..WeightQuery::default() }, "/weights"),
-            (WeightQuery { alpha: Some(1.0), ..WeightQuery::default() }, "/beta"),
-            (WeightQuery { alpha: Some(1.0), beta: Some(0.0), gamma: Some(0.0), ..WeightQuery::default() }, "/gamma"),
-            (WeightQuery { weights: Some(vec![1.0, 0.0]), beta: Some(0.0), ..WeightQuery::default() }, "/beta"),
-            (WeightQuery { weights: Some(vec![1e13, 0.0]), ..WeightQuery::default() }, "/weights"),
             (
-                WeightQuery { weights: Some(vec![1.0, 0.0]), base: Some(vec![1.0; 3]), ..WeightQuery::default() },
+                WeightQuery {
+                    weights: Some(vec![1.0]),
+                    ..WeightQuery::default()
+                },
+                "/weights",
+            ),
+            (
+                WeightQuery {
+                    alpha: Some(1.0),
+                    ..WeightQuery::default()
+                },
+                "/beta",
+            ),
+            (
+                WeightQuery {
+                    alpha: Some(1.0),
+                    beta: Some(0.0),
+                    gamma: Some(0.0),
+                    ..WeightQuery::default()
+                },
+                "/gamma",
+            ),
+            (
+                WeightQuery {
+                    weights: Some(vec![1.0, 0.0]),
+                    beta: Some(0.0),
+                    ..WeightQuery::default()
+                },
+                "/beta",
+            ),
+            (
+                WeightQuery {
+                    weights: Some(vec![1e13, 0.0]),
+                    ..WeightQuery::default()
+                },
+                "/weights",
+            ),
+            (
+                WeightQuery {
+                    weights: Some(vec![1.0, 0.0]),
+                    base: Some(vec![1.0; 3]),
+                    ..WeightQuery::default()
+                },
                 "/base",
             ),
         ];

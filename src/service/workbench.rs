@@ -38,7 +38,11 @@ impl Workbench {
     /// So many places, and so many who may wait for one.
     #[must_use]
     pub fn new(places: usize, most_waiting: usize) -> Self {
-        Self { places: Arc::new(Semaphore::new(places.max(1))), waiting: Arc::default(), most_waiting }
+        Self {
+            places: Arc::new(Semaphore::new(places.max(1))),
+            waiting: Arc::default(),
+            most_waiting,
+        }
     }
 
     /// Computes at the next free place.
@@ -46,10 +50,15 @@ impl Workbench {
     /// # Errors
     ///
     /// [`Problem`] when too many wait already, or when the work panicked.
-    pub async fn run<T: Send + 'static>(&self, work: impl FnOnce() -> T + Send + 'static) -> Result<T, Problem> {
+    pub async fn run<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Problem> {
         match self.run_or_call_off(work).await? {
             Ok(value) => Ok(value),
-            Err(CalledOff) => Err(Problem::internal("work was called off that nobody can call off")),
+            Err(CalledOff) => Err(Problem::internal(
+                "work was called off that nobody can call off",
+            )),
         }
     }
 
@@ -68,7 +77,10 @@ impl Workbench {
             if self.places.available_permits() == 0 && ahead >= self.most_waiting {
                 return Err(Problem::overloaded());
             }
-            Arc::clone(&self.places).acquire_owned().await.map_err(Problem::internal)?
+            Arc::clone(&self.places)
+                .acquire_owned()
+                .await
+                .map_err(Problem::internal)?
         };
         let done = spawn_blocking(move || {
             let _place = place;
@@ -78,7 +90,10 @@ impl Workbench {
             Ok(value) => Ok(Ok(value)),
             Err(error) => match error.try_into_panic() {
                 Ok(panic) if panic.is::<CalledOff>() => Ok(Err(CalledOff)),
-                Ok(panic) => Err(Problem::internal(format!("work panicked: {}", words(panic.as_ref())))),
+                Ok(panic) => Err(Problem::internal(format!(
+                    "work panicked: {}",
+                    words(panic.as_ref())
+                ))),
                 Err(error) => Err(Problem::internal(error)),
             },
         }
@@ -91,7 +106,11 @@ pub fn call_off() -> ! {
 }
 
 fn words(panic: &(dyn Any + Send)) -> &str {
-    panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("?")
+    panic
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("?")
 }
 
 #[cfg(test)]
@@ -118,7 +137,10 @@ mod tests {
         while bench.waiting.load(Ordering::SeqCst) == 0 {
             tokio::task::yield_now().await;
         }
-        assert_eq!(bench.run(|| 8).await.expect_err("the queue is full").kind(), Kind::Overloaded);
+        assert_eq!(
+            bench.run(|| 8).await.expect_err("the queue is full").kind(),
+            Kind::Overloaded
+        );
         drop(open);
         assert_eq!(waits.await.expect("runs"), Ok(7));
         assert_eq!(busy.await.expect("runs"), Ok(true));
@@ -128,8 +150,14 @@ mod tests {
     #[tokio::test]
     async fn a_panic_and_a_call_are_told_apart_and_the_place_is_free_again() {
         let bench = Workbench::new(1, 1);
-        assert_eq!(bench.run(|| panic!("a bug, on purpose")).await, Err::<(), _>(Problem::internal("")));
-        assert_eq!(bench.run_or_call_off(|| call_off()).await, Ok(Err::<(), _>(CalledOff)));
+        assert_eq!(
+            bench.run(|| panic!("a bug, on purpose")).await,
+            Err::<(), _>(Problem::internal(""))
+        );
+        assert_eq!(
+            bench.run_or_call_off(|| call_off()).await,
+            Ok(Err::<(), _>(CalledOff))
+        );
         let through_threads = bench.run_or_call_off(|| rayon::join(|| call_off(), || 2));
         assert_eq!(through_threads.await, Ok(Err::<((), i32), _>(CalledOff)));
         assert_eq!(bench.run(|| 1).await, Ok(1));

@@ -157,14 +157,24 @@ pub trait Works: Debug + Send + Sync {
     /// # Errors
     ///
     /// [`WorkError`] for an upload that is no measurement.
-    fn ingest(&self, upload: &Path, order: &IngestOrder, progress: Progress<'_>) -> Result<PaintFile, WorkError>;
+    fn ingest(
+        &self,
+        upload: &Path,
+        order: &IngestOrder,
+        progress: Progress<'_>,
+    ) -> Result<PaintFile, WorkError>;
 
     /// Paints become a blend.
     ///
     /// # Errors
     ///
     /// [`WorkError`] for paints that cannot be blended.
-    fn blend(&self, paints: &[&PaintFile], accuracy: Accuracy, progress: Progress<'_>) -> Result<Blend, WorkError>;
+    fn blend(
+        &self,
+        paints: &[&PaintFile],
+        accuracy: Accuracy,
+        progress: Progress<'_>,
+    ) -> Result<Blend, WorkError>;
 
     /// A paint, or a blend at some weights, becomes a file.
     ///

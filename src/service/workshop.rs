@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH, Thing, View,
-    WorkError, Works,
+    Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH,
+    Thing, View, WorkError, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
@@ -35,7 +35,11 @@ impl From<WorkshopError> for WorkError {
             workshop::Fault::Input => Fault::Upload,
             workshop::Fault::Output | workshop::Fault::Internal => Fault::Internal,
         };
-        Self { fault, field: error.field, message: error.message }
+        Self {
+            fault,
+            field: error.field,
+            message: error.message,
+        }
     }
 }
 
@@ -48,14 +52,19 @@ pub(super) fn profile(accuracy: Accuracy) -> Result<Profile, WorkshopError> {
     };
     match accuracy.clusters {
         None => Ok(preset),
-        Some(clusters) => {
-            preset.with_clusters(clusters as usize).map_err(|error| WorkshopError::usage("clusters", error))
-        }
+        Some(clusters) => preset
+            .with_clusters(clusters as usize)
+            .map_err(|error| WorkshopError::usage("clusters", error)),
     }
 }
 
 impl Works for Workshop {
-    fn ingest(&self, upload: &Path, order: &IngestOrder, progress: Progress<'_>) -> Result<PaintFile, WorkError> {
+    fn ingest(
+        &self,
+        upload: &Path,
+        order: &IngestOrder,
+        progress: Progress<'_>,
+    ) -> Result<PaintFile, WorkError> {
         let layout = order.layout.map(|layout| match layout {
             Layout::Mpi2005 => measurement::Layout::Mpi2005,
             Layout::Merl => measurement::Layout::Merl,
@@ -68,7 +77,11 @@ impl Works for Workshop {
         });
         let options = IngestOptions {
             name: order.name.clone(),
-            read: ReadOptions { layout, theta_h, header_bytes: order.header_bytes },
+            read: ReadOptions {
+                layout,
+                theta_h,
+                header_bytes: order.header_bytes,
+            },
             coat_ior: order.coat_ior,
             clusters: order.accuracy.clusters.map(|n| n as usize),
             profile: profile(order.accuracy)?,
@@ -77,7 +90,12 @@ impl Works for Workshop {
         Ok(workshop::ingest_upload(upload, &options, progress)?)
     }
 
-    fn blend(&self, paints: &[&PaintFile], accuracy: Accuracy, progress: Progress<'_>) -> Result<Blend, WorkError> {
+    fn blend(
+        &self,
+        paints: &[&PaintFile],
+        accuracy: Accuracy,
+        progress: Progress<'_>,
+    ) -> Result<Blend, WorkError> {
         Ok(workshop::blend_paints(paints, &profile(accuracy)?, progress)?.blend)
     }
 

@@ -127,7 +127,9 @@ impl FromStr for Hash {
 
 impl fmt::Debug for BlobBytes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("BlobBytes").field("length", &self.length).finish_non_exhaustive()
+        f.debug_struct("BlobBytes")
+            .field("length", &self.length)
+            .finish_non_exhaustive()
     }
 }
 

@@ -121,7 +121,12 @@ pub trait Paints: Send + Sync {
     fn paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>>;
 
     /// Up to `limit` paints whose name or source contains `q`, whatever the case, from `cursor` on.
-    fn paints<'a>(&'a self, q: Option<&'a str>, cursor: Option<i64>, limit: u32) -> Task<'a, PaintPage>;
+    fn paints<'a>(
+        &'a self,
+        q: Option<&'a str>,
+        cursor: Option<i64>,
+        limit: u32,
+    ) -> Task<'a, PaintPage>;
 
     /// Removes a paint and hands out what was on record.
     fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>>;
@@ -154,7 +159,12 @@ pub trait JobBook: Send + Sync {
     fn return_job<'a>(&'a self, id: &'a str) -> Task<'a, ()>;
 
     /// Ends an unfinished job as done, failed or cancelled. `false` when it had ended already.
-    fn end_job<'a>(&'a self, id: &'a str, state: JobState, problem: Option<&'a str>) -> Task<'a, bool>;
+    fn end_job<'a>(
+        &'a self,
+        id: &'a str,
+        state: JobState,
+        problem: Option<&'a str>,
+    ) -> Task<'a, bool>;
 }
 
 /// The whole catalogue.
@@ -186,7 +196,15 @@ impl JobState {
     }
 
     pub(super) fn of_word(word: &str) -> Option<Self> {
-        [Self::Queued, Self::Running, Self::Done, Self::Failed, Self::Cancelled].into_iter().find(|s| s.word() == word)
+        [
+            Self::Queued,
+            Self::Running,
+            Self::Done,
+            Self::Failed,
+            Self::Cancelled,
+        ]
+        .into_iter()
+        .find(|s| s.word() == word)
     }
 }
 
@@ -201,6 +219,8 @@ impl JobKind {
     }
 
     pub(super) fn of_word(word: &str) -> Option<Self> {
-        [Self::Ingest, Self::Blend].into_iter().find(|k| k.word() == word)
+        [Self::Ingest, Self::Blend]
+            .into_iter()
+            .find(|k| k.word() == word)
     }
 }

@@ -15,13 +15,31 @@ async fn blobs_conform(blobs: &dyn Blobs) {
 
     let mut writer = blobs.begin().await.expect("begins");
     for piece in silver.chunks(1000) {
-        writer.append(silver.slice_ref(piece)).await.expect("appends");
-        assert!(blobs.local(hash).await.expect("reads").is_none(), "a half-written blob is seen");
+        writer
+            .append(silver.slice_ref(piece))
+            .await
+            .expect("appends");
+        assert!(
+            blobs.local(hash).await.expect("reads").is_none(),
+            "a half-written blob is seen"
+        );
     }
     let stored = writer.finish().await.expect("finishes");
-    assert_eq!(stored, Stored { hash, length: 3 << 20 });
-    assert_eq!(blobs.read(hash).await.expect("reads").expect("is there"), silver);
-    assert_eq!(blobs.put(silver.clone()).await.expect("the same again"), stored);
+    assert_eq!(
+        stored,
+        Stored {
+            hash,
+            length: 3 << 20
+        }
+    );
+    assert_eq!(
+        blobs.read(hash).await.expect("reads").expect("is there"),
+        silver
+    );
+    assert_eq!(
+        blobs.put(silver.clone()).await.expect("the same again"),
+        stored
+    );
 
     let streamed = blobs.stream(hash).await.expect("reads").expect("is there");
     assert_eq!(streamed.length, 3 << 20);
@@ -31,12 +49,27 @@ async fn blobs_conform(blobs: &dyn Blobs) {
     assert_eq!(std::fs::read(local.path()).expect("is a file"), silver);
 
     let mut forgotten = blobs.begin().await.expect("begins");
-    forgotten.append(Bytes::from_static(b"never finished")).await.expect("appends");
+    forgotten
+        .append(Bytes::from_static(b"never finished"))
+        .await
+        .expect("appends");
     drop(forgotten);
-    assert!(blobs.read(Hash::of(b"never finished")).await.expect("reads").is_none());
+    assert!(
+        blobs
+            .read(Hash::of(b"never finished"))
+            .await
+            .expect("reads")
+            .is_none()
+    );
 
-    let nothing = blobs.put(Bytes::new()).await.expect("an empty blob is a blob");
-    assert_eq!(blobs.read(nothing.hash).await.expect("reads"), Some(Bytes::new()));
+    let nothing = blobs
+        .put(Bytes::new())
+        .await
+        .expect("an empty blob is a blob");
+    assert_eq!(
+        blobs.read(nothing.hash).await.expect("reads"),
+        Some(Bytes::new())
+    );
 
     let mut all = blobs.all().await.expect("lists");
     all.sort();
@@ -44,7 +77,10 @@ async fn blobs_conform(blobs: &dyn Blobs) {
     want.sort();
     assert_eq!(all, want);
     blobs.remove(hash).await.expect("removes");
-    blobs.remove(hash).await.expect("removing nothing is no error");
+    blobs
+        .remove(hash)
+        .await
+        .expect("removing nothing is no error");
     assert!(blobs.read(hash).await.expect("reads").is_none());
     assert_eq!(blobs.put(silver).await.expect("and back").hash, hash);
 }
@@ -61,27 +97,75 @@ fn paint(id: &str, name: &str, measurement: Option<Hash>) -> PaintRecord {
 }
 
 fn names(page: &PaintPage) -> Vec<&str> {
-    page.paints.iter().map(|paint| paint.name.as_str()).collect()
+    page.paints
+        .iter()
+        .map(|paint| paint.name.as_str())
+        .collect()
 }
 
 /// What [`Paints`] and [`Blends`] promise, on an empty catalogue.
 async fn records_conform(catalogue: &dyn Catalogue) {
     let upload = Hash::of(b"upload");
-    for (id, name) in [("p_1", "Æther 50 % silver"), ("p_2", "blue"), ("p_3", "Silver_blue")] {
-        assert!(catalogue.add_paint(&paint(id, name, Some(upload))).await.expect("adds"));
+    for (id, name) in [
+        ("p_1", "Æther 50 % silver"),
+        ("p_2", "blue"),
+        ("p_3", "Silver_blue"),
+    ] {
+        assert!(
+            catalogue
+                .add_paint(&paint(id, name, Some(upload)))
+                .await
+                .expect("adds")
+        );
     }
-    assert!(!catalogue.add_paint(&paint("p_1", "another", None)).await.expect("adds nothing"));
-    assert_eq!(catalogue.paint("p_1").await.expect("reads").expect("is there").name, "Æther 50 % silver");
+    assert!(
+        !catalogue
+            .add_paint(&paint("p_1", "another", None))
+            .await
+            .expect("adds nothing")
+    );
+    assert_eq!(
+        catalogue
+            .paint("p_1")
+            .await
+            .expect("reads")
+            .expect("is there")
+            .name,
+        "Æther 50 % silver"
+    );
     assert!(catalogue.paint("p_9").await.expect("reads").is_none());
 
     let all = catalogue.paints(None, None, 10).await.expect("lists");
-    assert_eq!((names(&all), all.next), (vec!["Æther 50 % silver", "blue", "Silver_blue"], None));
-    for (q, found) in [("SILVER", 2), ("æTHER", 1), ("%", 1), ("_", 1), ("'", 0), ("PACKAGE", 3), ("", 3)] {
-        assert_eq!(catalogue.paints(Some(q), None, 10).await.expect("lists").paints.len(), found, "{q}");
+    assert_eq!(
+        (names(&all), all.next),
+        (vec!["Æther 50 % silver", "blue", "Silver_blue"], None)
+    );
+    for (q, found) in [
+        ("SILVER", 2),
+        ("æTHER", 1),
+        ("%", 1),
+        ("_", 1),
+        ("'", 0),
+        ("PACKAGE", 3),
+        ("", 3),
+    ] {
+        assert_eq!(
+            catalogue
+                .paints(Some(q), None, 10)
+                .await
+                .expect("lists")
+                .paints
+                .len(),
+            found,
+            "{q}"
+        );
     }
     let first = catalogue.paints(None, None, 2).await.expect("lists");
     let rest = catalogue.paints(None, first.next, 2).await.expect("lists");
-    assert_eq!((names(&first).len(), names(&rest), rest.next), (2, vec!["Silver_blue"], None));
+    assert_eq!(
+        (names(&first).len(), names(&rest), rest.next),
+        (2, vec!["Silver_blue"], None)
+    );
 
     let blend = BlendRecord {
         id: "b_1".to_owned(),
@@ -99,27 +183,73 @@ async fn records_conform(catalogue: &dyn Catalogue) {
     let wants_it = new_job("j_wants", "p_4", &format!(r#"{{"upload":"{upload}"}}"#));
     catalogue.submit_job(&wants_it).await.expect("submits");
     for id in ["p_1", "p_2", "p_3"] {
-        let gone = catalogue.remove_paint(id).await.expect("removes").expect("was there");
-        assert_eq!(named(gone.paint).await, id == "p_2", "only a blend names that one");
+        let gone = catalogue
+            .remove_paint(id)
+            .await
+            .expect("removes")
+            .expect("was there");
+        assert_eq!(
+            named(gone.paint).await,
+            id == "p_2",
+            "only a blend names that one"
+        );
         assert!(named(upload).await);
-        assert!(catalogue.remove_paint(id).await.expect("removes nothing").is_none());
+        assert!(
+            catalogue
+                .remove_paint(id)
+                .await
+                .expect("removes nothing")
+                .is_none()
+        );
     }
-    assert!(catalogue.end_job("j_wants", JobState::Cancelled, None).await.expect("ends"));
+    assert!(
+        catalogue
+            .end_job("j_wants", JobState::Cancelled, None)
+            .await
+            .expect("ends")
+    );
     assert!(!named(upload).await);
-    assert!(catalogue.paints(None, None, 10).await.expect("lists").paints.is_empty());
+    assert!(
+        catalogue
+            .paints(None, None, 10)
+            .await
+            .expect("lists")
+            .paints
+            .is_empty()
+    );
 }
 
 fn new_job(id: &str, subject: &str, request: &str) -> NewJob {
-    NewJob { id: id.to_owned(), kind: JobKind::Ingest, subject: subject.to_owned(), request: request.to_owned() }
+    NewJob {
+        id: id.to_owned(),
+        kind: JobKind::Ingest,
+        subject: subject.to_owned(),
+        request: request.to_owned(),
+    }
 }
 
 /// What [`JobBook`] promises, on a catalogue without unfinished jobs.
 async fn jobs_conform(catalogue: &dyn Catalogue) {
-    let first = catalogue.submit_job(&new_job("j_1", "p_1", "{}")).await.expect("submits");
+    let first = catalogue
+        .submit_job(&new_job("j_1", "p_1", "{}"))
+        .await
+        .expect("submits");
     assert!(first.new);
-    let same = catalogue.submit_job(&new_job("j_2", "p_1", "{}")).await.expect("submits");
-    assert!(!same.new && same.job.id == "j_1", "one unfinished job a subject");
-    assert!(catalogue.submit_job(&new_job("j_3", "p_2", "{}")).await.expect("submits").new);
+    let same = catalogue
+        .submit_job(&new_job("j_2", "p_1", "{}"))
+        .await
+        .expect("submits");
+    assert!(
+        !same.new && same.job.id == "j_1",
+        "one unfinished job a subject"
+    );
+    assert!(
+        catalogue
+            .submit_job(&new_job("j_3", "p_2", "{}"))
+            .await
+            .expect("submits")
+            .new
+    );
     assert!(catalogue.job("j_2").await.expect("reads").is_none());
 
     let state = |id: &'static str| async move {
@@ -132,14 +262,34 @@ async fn jobs_conform(catalogue: &dyn Catalogue) {
     assert_eq!(state("j_1").await, (JobState::Queued, 0));
     catalogue.begin_job("j_1").await.expect("begins");
     let unfinished = catalogue.unfinished_jobs().await.expect("lists");
-    assert_eq!(unfinished.iter().map(|job| job.id.as_str()).collect::<Vec<_>>(), ["j_1", "j_3"]);
+    assert_eq!(
+        unfinished
+            .iter()
+            .map(|job| job.id.as_str())
+            .collect::<Vec<_>>(),
+        ["j_1", "j_3"]
+    );
 
-    assert!(catalogue.end_job("j_1", JobState::Failed, Some("{}")).await.expect("ends"));
-    assert!(!catalogue.end_job("j_1", JobState::Done, None).await.expect("an end is an end"));
+    assert!(
+        catalogue
+            .end_job("j_1", JobState::Failed, Some("{}"))
+            .await
+            .expect("ends")
+    );
+    assert!(
+        !catalogue
+            .end_job("j_1", JobState::Done, None)
+            .await
+            .expect("an end is an end")
+    );
     catalogue.begin_job("j_1").await.expect("changes nothing");
     assert_eq!(state("j_1").await, (JobState::Failed, 1));
     assert!(
-        catalogue.submit_job(&new_job("j_4", "p_1", "{}")).await.expect("submits").new,
+        catalogue
+            .submit_job(&new_job("j_4", "p_1", "{}"))
+            .await
+            .expect("submits")
+            .new,
         "a failed job may be redone"
     );
     catalogue.ping().await.expect("answers");
@@ -155,15 +305,28 @@ async fn a_folder_keeps_blobs() {
 async fn a_folder_sweeps_what_a_crash_left() {
     let root = tempfile::tempdir().expect("temporary folder");
     let blobs = FolderBlobs::open(root.path()).expect("opens");
-    let kept = blobs.put(Bytes::from_static(b"kept")).await.expect("writes");
+    let kept = blobs
+        .put(Bytes::from_static(b"kept"))
+        .await
+        .expect("writes");
     let mut writer = blobs.begin().await.expect("begins");
-    writer.append(Bytes::from(vec![0; 4 << 20])).await.expect("appends");
+    writer
+        .append(Bytes::from(vec![0; 4 << 20]))
+        .await
+        .expect("appends");
     std::mem::forget(writer);
-    let incoming = || std::fs::read_dir(root.path().join("incoming")).expect("a folder").count();
+    let incoming = || {
+        std::fs::read_dir(root.path().join("incoming"))
+            .expect("a folder")
+            .count()
+    };
     assert_eq!(incoming(), 1);
     let again = FolderBlobs::open(root.path()).expect("opens");
     assert_eq!(incoming(), 0);
-    assert_eq!(again.read(kept.hash).await.expect("reads"), Some(Bytes::from_static(b"kept")));
+    assert_eq!(
+        again.read(kept.hash).await.expect("reads"),
+        Some(Bytes::from_static(b"kept"))
+    );
 }
 
 #[tokio::test]
@@ -175,6 +338,13 @@ async fn sqlite_keeps_records_and_jobs() {
     jobs_conform(&catalogue).await;
     catalogue.close().await;
     let again = SqliteCatalogue::open(&file).await.expect("opens again");
-    assert_eq!(again.unfinished_jobs().await.expect("lists").len(), 2, "jobs survive");
-    assert!(again.blend("b_1").await.expect("reads").is_some(), "records survive");
+    assert_eq!(
+        again.unfinished_jobs().await.expect("lists").len(),
+        2,
+        "jobs survive"
+    );
+    assert!(
+        again.blend("b_1").await.expect("reads").is_some(),
+        "records survive"
+    );
 }

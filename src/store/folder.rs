@@ -51,7 +51,10 @@ impl FolderBlobs {
             fs::create_dir_all(&incoming)?;
             sync_folder(root)
         };
-        make().map_err(StoreError::io(format!("opening the blobs in {}", root.display())))?;
+        make().map_err(StoreError::io(format!(
+            "opening the blobs in {}",
+            root.display()
+        )))?;
         Ok(Self { blobs, incoming })
     }
 
@@ -72,7 +75,12 @@ fn names(blobs: &Path) -> io::Result<Vec<Hash>> {
         let folder = folder?;
         if folder.file_type()?.is_dir() {
             for file in fs::read_dir(folder.path())? {
-                names.extend(file?.file_name().to_str().and_then(|name| name.parse::<Hash>().ok()));
+                names.extend(
+                    file?
+                        .file_name()
+                        .to_str()
+                        .and_then(|name| name.parse::<Hash>().ok()),
+                );
             }
         }
     }
@@ -107,21 +115,34 @@ impl Blobs for FolderBlobs {
                 .map_err(StoreError::io("beginning a blob"))?;
             let (file, path) = file.into_parts();
             let (file, hasher) = (tokio::fs::File::from_std(file), blake3::Hasher::new());
-            let writer = FolderWriter { file, path, blobs, hasher, length: 0, gathered: Vec::new() };
+            let writer = FolderWriter {
+                file,
+                path,
+                blobs,
+                hasher,
+                length: 0,
+                gathered: Vec::new(),
+            };
             Ok(Box::new(writer) as Box<dyn BlobWriter>)
         })
     }
 
     fn read(&self, hash: Hash) -> Task<'_, Option<Bytes>> {
         let path = self.place(hash);
-        Box::pin(async move { Ok(found(off_thread(move || fs::read(path)).await, hash)?.map(Bytes::from)) })
+        Box::pin(async move {
+            Ok(found(off_thread(move || fs::read(path)).await, hash)?.map(Bytes::from))
+        })
     }
 
     fn stream(&self, hash: Hash) -> Task<'_, Option<BlobBytes>> {
         let path = self.place(hash);
         Box::pin(async move {
-            let Some(file) = found(tokio::fs::File::open(path).await, hash)? else { return Ok(None) };
-            let Some(metadata) = found(file.metadata().await, hash)? else { return Ok(None) };
+            let Some(file) = found(tokio::fs::File::open(path).await, hash)? else {
+                return Ok(None);
+            };
+            let Some(metadata) = found(file.metadata().await, hash)? else {
+                return Ok(None);
+            };
             let pieces = futures::stream::try_unfold(file, move |mut file| async move {
                 let mut piece = Vec::with_capacity(PIECE);
                 (&mut file)
@@ -131,14 +152,19 @@ impl Blobs for FolderBlobs {
                     .map_err(StoreError::io(format!("reading blob {hash}")))?;
                 Ok((!piece.is_empty()).then(|| (Bytes::from(piece), file)))
             });
-            Ok(Some(BlobBytes { length: metadata.len(), pieces: pieces.boxed() }))
+            Ok(Some(BlobBytes {
+                length: metadata.len(),
+                pieces: pieces.boxed(),
+            }))
         })
     }
 
     fn local(&self, hash: Hash) -> Task<'_, Option<LocalBlob>> {
         let path = self.place(hash);
         Box::pin(async move {
-            let here = tokio::fs::metadata(&path).await.map(|_| LocalBlob::new(path));
+            let here = tokio::fs::metadata(&path)
+                .await
+                .map(|_| LocalBlob::new(path));
             found(here, hash)
         })
     }
@@ -150,7 +176,11 @@ impl Blobs for FolderBlobs {
 
     fn all(&self) -> Task<'_, Vec<Hash>> {
         let blobs = self.blobs.clone();
-        Box::pin(async move { off_thread(move || names(&blobs)).await.map_err(StoreError::io("listing the blobs")) })
+        Box::pin(async move {
+            off_thread(move || names(&blobs))
+                .await
+                .map_err(StoreError::io("listing the blobs"))
+        })
     }
 }
 
@@ -177,14 +207,28 @@ impl BlobWriter for FolderWriter {
 
     fn finish(mut self: Box<Self>) -> Task<'static, Stored> {
         Box::pin(async move {
-            let stored = Stored { hash: self.hasher.finalize().into(), length: self.length };
+            let stored = Stored {
+                hash: self.hasher.finalize().into(),
+                length: self.length,
+            };
             let place = place(&self.blobs, stored.hash);
-            self.spill().await.map_err(StoreError::io("writing a blob"))?;
-            self.file.flush().await.map_err(StoreError::io("writing a blob"))?;
-            let file = NamedTempFile::from_parts(self.file.into_std().await, self.path);
-            off_thread(move || if place.exists() { Ok(()) } else { appear(file, &place, Durability::Synced) })
+            self.spill()
                 .await
-                .map_err(StoreError::io(format!("storing blob {}", stored.hash)))?;
+                .map_err(StoreError::io("writing a blob"))?;
+            self.file
+                .flush()
+                .await
+                .map_err(StoreError::io("writing a blob"))?;
+            let file = NamedTempFile::from_parts(self.file.into_std().await, self.path);
+            off_thread(move || {
+                if place.exists() {
+                    Ok(())
+                } else {
+                    appear(file, &place, Durability::Synced)
+                }
+            })
+            .await
+            .map_err(StoreError::io(format!("storing blob {}", stored.hash)))?;
             Ok(stored)
         })
     }

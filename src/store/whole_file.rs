@@ -21,7 +21,9 @@ pub(super) enum Durability {
 
 /// Moves a finished temporary file to its place. The folder of `place` is made where it is missing.
 pub(super) fn appear(file: NamedTempFile, place: &Path, durability: Durability) -> io::Result<()> {
-    let folder = place.parent().ok_or_else(|| io::Error::other("a file needs a folder"))?;
+    let folder = place
+        .parent()
+        .ok_or_else(|| io::Error::other("a file needs a folder"))?;
     if durability == Durability::Synced {
         file.as_file().sync_all()?;
     }

@@ -23,7 +23,9 @@ pub(super) const TIE_BREAK: f64 = 5e-10;
 pub(super) const LANES: usize = 8;
 
 /// Cost of moving one unit of mass from one point to another.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize,
+)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Cost {

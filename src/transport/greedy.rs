@@ -27,13 +27,26 @@ impl Solver for Greedy {
     ) -> Result<(), TransportError> {
         problem.check_filled()?;
         workspace.prepare(problem, cost);
-        let Workspace { matrix, units, start, flows, source_duals, target_duals, .. } = workspace;
+        let Workspace {
+            matrix,
+            units,
+            start,
+            flows,
+            source_duals,
+            target_duals,
+            ..
+        } = workspace;
         greedy_start(matrix, units, start);
         flows.clear();
         flows.extend(steps_as_flows(&start.steps));
         flows.sort_unstable_by_key(|flow| (flow.source, flow.target));
         plan.restart();
-        for &Flow { source, target, grains } in &*flows {
+        for &Flow {
+            source,
+            target,
+            grains,
+        } in &*flows
+        {
             plan.push(units, source, target, grains);
         }
         plan.price(problem, cost);

@@ -37,13 +37,21 @@ impl Solver for LinearProgram {
     ) -> Result<(), TransportError> {
         problem.check_filled()?;
         workspace.prepare(problem, cost);
-        let Workspace { matrix, units, start, source_duals, target_duals, .. } = workspace;
+        let Workspace {
+            matrix,
+            units,
+            start,
+            source_duals,
+            target_duals,
+            ..
+        } = workspace;
         let (sources, targets) = (problem.source().len(), problem.target().len());
         let mut variables = ProblemVariables::new();
         let flows = variables.add_vector(variable().min(0.0), sources * targets);
         let scale = 1.0 / matrix.largest().max(f64::MIN_POSITIVE);
-        let objective: Expression =
-            (0..sources * targets).map(|k| flows[k] * (matrix.at(k / targets, k % targets) * scale)).sum();
+        let objective: Expression = (0..sources * targets)
+            .map(|k| flows[k] * (matrix.at(k / targets, k % targets) * scale))
+            .sum();
         let mut model = variables.minimise(objective).using(microlp);
         for (i, &mass) in problem.source().masses().iter().enumerate() {
             let row: Expression = flows[i * targets..(i + 1) * targets].iter().sum();
@@ -53,12 +61,24 @@ impl Solver for LinearProgram {
             let column: Expression = flows[j..].iter().step_by(targets).sum();
             model.add_constraint(column.eq(mass * MASS_SCALE));
         }
-        let solution = model.solve().map_err(|error| TransportError::LinearProgram(error.to_string()))?;
-        let masses: Vec<f64> = flows.iter().map(|&flow| solution.value(flow) / MASS_SCALE).collect();
+        let solution = model
+            .solve()
+            .map_err(|error| TransportError::LinearProgram(error.to_string()))?;
+        let masses: Vec<f64> = flows
+            .iter()
+            .map(|&flow| solution.value(flow) / MASS_SCALE)
+            .collect();
         check_marginals(problem, &masses)?;
 
         let moved = masses.iter().enumerate();
-        vertex_below(problem, matrix, units, start, moved.map(|(k, &mass)| (k / targets, k % targets, mass)), plan);
+        vertex_below(
+            problem,
+            matrix,
+            units,
+            start,
+            moved.map(|(k, &mass)| (k / targets, k % targets, mass)),
+            plan,
+        );
         plan.price(problem, cost);
         residual_duals(problem, matrix, plan, source_duals, target_duals);
         plan.certify(problem, matrix, cost, source_duals, target_duals);
@@ -68,17 +88,27 @@ impl Solver for LinearProgram {
 
 fn check_marginals(problem: &Problem, masses: &[f64]) -> Result<(), TransportError> {
     let targets = problem.target().len();
-    let sent = masses.chunks_exact(targets).map(|row| row.iter().sum::<f64>());
+    let sent = masses
+        .chunks_exact(targets)
+        .map(|row| row.iter().sum::<f64>());
     let received = (0..targets).map(|j| masses[j..].iter().step_by(targets).sum::<f64>());
-    let wanted = problem.source().masses().iter().chain(problem.target().masses());
+    let wanted = problem
+        .source()
+        .masses()
+        .iter()
+        .chain(problem.target().masses());
     for (moved, &mass) in sent.chain(received).zip(wanted) {
         let off = moved - mass;
         if off.abs() > MARGINAL_TOLERANCE || off.is_nan() {
-            return Err(TransportError::LinearProgram(format!("its answer moves {moved} where the mass is {mass}")));
+            return Err(TransportError::LinearProgram(format!(
+                "its answer moves {moved} where the mass is {mass}"
+            )));
         }
     }
     if let Some(negative) = masses.iter().find(|mass| **mass < -MARGINAL_TOLERANCE) {
-        return Err(TransportError::LinearProgram(format!("its answer moves {negative}")));
+        return Err(TransportError::LinearProgram(format!(
+            "its answer moves {negative}"
+        )));
     }
     Ok(())
 }

@@ -93,7 +93,9 @@ impl Solver for Method {
     ) -> Result<(), TransportError> {
         match *self {
             Self::Exact => TransportSimplex.solve_into(problem, cost, workspace, plan),
-            Self::Sinkhorn { epsilon } => Sinkhorn { epsilon }.solve_into(problem, cost, workspace, plan),
+            Self::Sinkhorn { epsilon } => {
+                Sinkhorn { epsilon }.solve_into(problem, cost, workspace, plan)
+            }
             Self::Greedy => Greedy.solve_into(problem, cost, workspace, plan),
             Self::LinearProgram => LinearProgram.solve_into(problem, cost, workspace, plan),
         }
@@ -105,7 +107,12 @@ impl Solver for Method {
 /// # Errors
 ///
 /// As [`Solver::solve_into`].
-pub fn solve(problem: &Problem, method: Method, cost: Cost, workspace: &mut Workspace) -> Result<Plan, TransportError> {
+pub fn solve(
+    problem: &Problem,
+    method: Method,
+    cost: Cost,
+    workspace: &mut Workspace,
+) -> Result<Plan, TransportError> {
     let mut plan = Plan::default();
     method.solve_into(problem, cost, workspace, &mut plan)?;
     Ok(plan)

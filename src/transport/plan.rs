@@ -53,15 +53,22 @@ impl Plan {
     /// Appends a flow of grains; flows of less than a unit are none.
     pub(super) fn push(&mut self, units: &Units, source: usize, target: usize, grains: i64) {
         if let Some(mass) = units.mass(source, target, grains) {
-            self.entries.push(PlanEntry { source, target, mass });
+            self.entries.push(PlanEntry {
+                source,
+                target,
+                mass,
+            });
         }
     }
 
     /// Sums up the cost of the entries.
     pub(super) fn price(&mut self, problem: &Problem, cost: Cost) {
         let (from, to) = (problem.source().points(), problem.target().points());
-        self.cost =
-            self.entries.iter().map(|entry| entry.mass * cost.between(from[entry.source], to[entry.target])).sum();
+        self.cost = self
+            .entries
+            .iter()
+            .map(|entry| entry.mass * cost.between(from[entry.source], to[entry.target]))
+            .sum();
     }
 
     /// Takes source duals of the tilted matrix, gives every target the largest dual they allow, and keeps the
@@ -79,18 +86,28 @@ impl Plan {
     }
 
     /// Keeps duals of the tilted matrix if their gap is the smallest seen.
-    pub(super) fn offer(&mut self, problem: &Problem, cost: Cost, source_duals: &[f64], target_duals: &[f64]) {
+    pub(super) fn offer(
+        &mut self,
+        problem: &Problem,
+        cost: Cost,
+        source_duals: &[f64],
+        target_duals: &[f64],
+    ) {
         let untilt = 1.0 / cost.tilt();
-        let dot = |masses: &[f64], duals: &[f64]| -> f64 { masses.iter().zip(duals).map(|(m, d)| m * d).sum() };
+        let dot = |masses: &[f64], duals: &[f64]| -> f64 {
+            masses.iter().zip(duals).map(|(m, d)| m * d).sum()
+        };
         let (p, q) = (problem.source().masses(), problem.target().masses());
         let dual = (dot(p, source_duals) + dot(q, target_duals)) * untilt;
         let gap = (self.cost - dual).max(0.0);
         if gap < self.gap {
             self.gap = gap;
             self.source_duals.clear();
-            self.source_duals.extend(source_duals[..p.len()].iter().map(|u| u * untilt));
+            self.source_duals
+                .extend(source_duals[..p.len()].iter().map(|u| u * untilt));
             self.target_duals.clear();
-            self.target_duals.extend(target_duals[..q.len()].iter().map(|v| v * untilt));
+            self.target_duals
+                .extend(target_duals[..q.len()].iter().map(|v| v * untilt));
         }
     }
 }

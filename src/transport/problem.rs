@@ -135,7 +135,11 @@ impl Cloud {
         self.masses.clear();
     }
 
-    fn fill(&mut self, side: Side, weighted: impl IntoIterator<Item = ([f64; 3], f64)>) -> Result<(), TransportError> {
+    fn fill(
+        &mut self,
+        side: Side,
+        weighted: impl IntoIterator<Item = ([f64; 3], f64)>,
+    ) -> Result<(), TransportError> {
         self.clear();
         for (point, mass) in weighted {
             self.points.push(point);
@@ -145,16 +149,31 @@ impl Cloud {
             return Err(TransportError::Empty(side));
         }
         if self.points.len() > MOST_POINTS {
-            return Err(TransportError::TooManyPoints { side, points: self.points.len() });
+            return Err(TransportError::TooManyPoints {
+                side,
+                points: self.points.len(),
+            });
         }
         for (index, point) in self.points.iter().enumerate() {
             // One comparison refuses NaN as well, which is never within bounds.
-            if let Some(axis) = point.iter().position(|x| !(-LARGEST_COORDINATE..=LARGEST_COORDINATE).contains(x)) {
+            if let Some(axis) = point
+                .iter()
+                .position(|x| !(-LARGEST_COORDINATE..=LARGEST_COORDINATE).contains(x))
+            {
                 let value = point[axis];
-                return Err(TransportError::Point { side, index, axis, value });
+                return Err(TransportError::Point {
+                    side,
+                    index,
+                    axis,
+                    value,
+                });
             }
         }
-        if let Some(index) = self.masses.iter().position(|&mass| !(mass > 0.0 && mass <= LARGEST_MASS)) {
+        if let Some(index) = self
+            .masses
+            .iter()
+            .position(|&mass| !(mass > 0.0 && mass <= LARGEST_MASS))
+        {
             let value = self.masses[index];
             return Err(TransportError::Mass { side, index, value });
         }
@@ -220,7 +239,11 @@ impl Problem {
             if points != masses {
                 self.source.clear();
                 self.target.clear();
-                return Err(TransportError::Unpaired { side, points, masses });
+                return Err(TransportError::Unpaired {
+                    side,
+                    points,
+                    masses,
+                });
             }
         }
         let pair = |(&point, &mass): (&[f64; 3], &f64)| (point, mass);
@@ -240,7 +263,10 @@ impl Problem {
         source: impl IntoIterator<Item = ([f64; 3], f64)>,
         target: impl IntoIterator<Item = ([f64; 3], f64)>,
     ) -> Result<(), TransportError> {
-        let filled = self.source.fill(Side::Source, source).and_then(|()| self.target.fill(Side::Target, target));
+        let filled = self
+            .source
+            .fill(Side::Source, source)
+            .and_then(|()| self.target.fill(Side::Target, target));
         if filled.is_err() {
             self.source.clear();
             self.target.clear();
@@ -280,14 +306,20 @@ mod tests {
 
     #[test]
     fn masses_are_rescaled_and_none_is_dropped() {
-        let problem = Problem::new(&[ORIGIN; 3], &[1e-300, 2.0, 6.0], &[ORIGIN], &[1e-7]).expect("positive masses");
+        let problem = Problem::new(&[ORIGIN; 3], &[1e-300, 2.0, 6.0], &[ORIGIN], &[1e-7])
+            .expect("positive masses");
         assert_eq!(problem.source().masses(), [1e-300 / 8.0, 0.25, 0.75]);
         assert_eq!(problem.target().masses(), [1.0]);
     }
 
     #[test]
     fn offenders_are_named_with_place_and_value() {
-        let nan = Problem::new(&[ORIGIN, [0.0, f64::NAN, 0.0]], &[1.0; 2], &[ORIGIN], &[1.0]);
+        let nan = Problem::new(
+            &[ORIGIN, [0.0, f64::NAN, 0.0]],
+            &[1.0; 2],
+            &[ORIGIN],
+            &[1.0],
+        );
         assert!(matches!(
             nan,
             Err(TransportError::Point {
@@ -300,14 +332,28 @@ mod tests {
         for bad in [0.0, -1.0, f64::INFINITY, f64::NAN] {
             let refused = Problem::new(&[ORIGIN], &[1.0], &[ORIGIN; 2], &[1.0, bad]);
             assert!(
-                matches!(refused, Err(TransportError::Mass { side: Side::Target, index: 1, .. })),
+                matches!(
+                    refused,
+                    Err(TransportError::Mass {
+                        side: Side::Target,
+                        index: 1,
+                        ..
+                    })
+                ),
                 "{bad}: {refused:?}"
             );
         }
-        assert_eq!(Problem::new(&[], &[], &[ORIGIN], &[1.0]), Err(TransportError::Empty(Side::Source)));
+        assert_eq!(
+            Problem::new(&[], &[], &[ORIGIN], &[1.0]),
+            Err(TransportError::Empty(Side::Source))
+        );
         assert_eq!(
             Problem::new(&[ORIGIN], &[1.0], &[ORIGIN], &[]),
-            Err(TransportError::Unpaired { side: Side::Target, points: 1, masses: 0 })
+            Err(TransportError::Unpaired {
+                side: Side::Target,
+                points: 1,
+                masses: 0
+            })
         );
         assert!(matches!(
             Problem::new(&[[1e101, 0.0, 0.0]], &[1.0], &[ORIGIN], &[1.0]),
@@ -318,7 +364,9 @@ mod tests {
     #[test]
     fn a_refused_refill_leaves_an_empty_problem() {
         let mut problem = Problem::new(&[ORIGIN], &[1.0], &[ORIGIN], &[1.0]).expect("fine");
-        problem.refill([(ORIGIN, 1.0)], [(ORIGIN, 0.0)]).expect_err("zero mass");
+        problem
+            .refill([(ORIGIN, 1.0)], [(ORIGIN, 0.0)])
+            .expect_err("zero mass");
         assert!(problem.check_filled().is_err());
     }
 }

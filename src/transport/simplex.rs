@@ -45,9 +45,21 @@ impl Solver for TransportSimplex {
     ) -> Result<(), TransportError> {
         problem.check_filled()?;
         workspace.prepare(problem, cost);
-        let Workspace { matrix, units, start, simplex, .. } = workspace;
+        let Workspace {
+            matrix,
+            units,
+            start,
+            simplex,
+            ..
+        } = workspace;
         let most_pivots = MOST_PIVOTS_PER_POINT * (problem.source().len() + problem.target().len());
-        let job = Job { problem, matrix, units, cost, most_pivots };
+        let job = Job {
+            problem,
+            matrix,
+            units,
+            cost,
+            most_pivots,
+        };
         let points = problem.source().len().max(problem.target().len());
         let scratch = &mut simplex.scratch;
         let solved = match points {
@@ -103,7 +115,11 @@ impl Job<'_> {
     ) -> bool {
         let matrix = self.matrix;
         let (sources, targets) = (self.units.supplies.len(), self.units.demands.len());
-        let Scratch { source_values, target_values, allowed } = scratch;
+        let Scratch {
+            source_values,
+            target_values,
+            allowed,
+        } = scratch;
         greedy_start(matrix, self.units, start);
         tree.plant(sources, targets, &start.steps);
         source_values.clear();
@@ -140,7 +156,12 @@ impl Job<'_> {
         plan.restart();
         tree.for_each_edge(|source, target, grains| plan.push(self.units, source, target, grains));
         plan.price(self.problem, self.cost);
-        plan.offer(self.problem, self.cost, source_values, allowed.as_flattened());
+        plan.offer(
+            self.problem,
+            self.cost,
+            source_values,
+            allowed.as_flattened(),
+        );
         true
     }
 }
@@ -206,8 +227,12 @@ mod tests {
     /// Clouds whose start is not the optimum.
     fn crossed() -> Problem {
         let at = |x: f64, y: f64| [x, y, 0.0];
-        let source: Vec<_> = (0..6).map(|i| at(f64::from(i), f64::from(i * i % 5))).collect();
-        let target: Vec<_> = (0..6).map(|i| at(f64::from(i * 5 % 7), f64::from(i % 3))).collect();
+        let source: Vec<_> = (0..6)
+            .map(|i| at(f64::from(i), f64::from(i * i % 5)))
+            .collect();
+        let target: Vec<_> = (0..6)
+            .map(|i| at(f64::from(i * 5 % 7), f64::from(i % 3)))
+            .collect();
         Problem::new(&source, &[1.0; 6], &target, &[1.0; 6]).expect("a fine problem")
     }
 
@@ -223,7 +248,12 @@ mod tests {
             most_pivots,
         };
         let mut plan = Plan::default();
-        let solved = job.run(&mut Tree::<1>::default(), &mut workspace.start, &mut Scratch::default(), &mut plan);
+        let solved = job.run(
+            &mut Tree::<1>::default(),
+            &mut workspace.start,
+            &mut Scratch::default(),
+            &mut plan,
+        );
         (solved, plan)
     }
 

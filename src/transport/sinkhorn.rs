@@ -62,7 +62,15 @@ impl Solver for Sinkhorn {
             return Err(TransportError::Epsilon(self.epsilon));
         }
         workspace.prepare(problem, cost);
-        let Workspace { matrix, units, start, scaling, source_duals, target_duals, .. } = workspace;
+        let Workspace {
+            matrix,
+            units,
+            start,
+            scaling,
+            source_duals,
+            target_duals,
+            ..
+        } = workspace;
         scaling.fit(problem, matrix, self.epsilon)?;
         let targets = problem.target().len();
         let pairs = (0..problem.source().len()).flat_map(|i| (0..targets).map(move |j| (i, j)));
@@ -95,12 +103,21 @@ impl Scaling {
     }
 
     /// Runs all stages; ends with the scalings absorbed.
-    fn fit(&mut self, problem: &Problem, matrix: &CostMatrix, epsilon: f64) -> Result<(), TransportError> {
+    fn fit(
+        &mut self,
+        problem: &Problem,
+        matrix: &CostMatrix,
+        epsilon: f64,
+    ) -> Result<(), TransportError> {
         let (p, q) = (problem.source().masses(), problem.target().masses());
         let (sources, targets) = (p.len(), q.len());
         #[expect(clippy::cast_precision_loss, reason = "at most 2^24 pairs")]
         let pairs = (sources * targets) as f64;
-        let mean = matrix.rows().flat_map(|row| &row.as_flattened()[..targets]).sum::<f64>() / pairs;
+        let mean = matrix
+            .rows()
+            .flat_map(|row| &row.as_flattened()[..targets])
+            .sum::<f64>()
+            / pairs;
         for (values, size, value) in [
             (&mut self.f, sources, 0.0),
             (&mut self.g, targets, 0.0),
@@ -132,7 +149,14 @@ impl Scaling {
     }
 
     /// Scales until the residual is met or the steps run out; gives the residual.
-    fn fit_stage(&mut self, p: &[f64], q: &[f64], matrix: &CostMatrix, eta: f64, steps_left: &mut usize) -> f64 {
+    fn fit_stage(
+        &mut self,
+        p: &[f64],
+        q: &[f64],
+        matrix: &CostMatrix,
+        eta: f64,
+        steps_left: &mut usize,
+    ) -> f64 {
         loop {
             let residual = self.residual(p);
             if residual <= Sinkhorn::RESIDUAL || *steps_left == 0 {
@@ -207,7 +231,8 @@ impl Scaling {
         self.kernel.clear();
         for (row, f) in matrix.rows().zip(&self.f) {
             let costs = row.as_flattened().iter().zip(&self.g);
-            self.kernel.extend(costs.map(|(cost, g)| ((f + g - cost) / eta).exp()));
+            self.kernel
+                .extend(costs.map(|(cost, g)| ((f + g - cost) / eta).exp()));
         }
     }
 

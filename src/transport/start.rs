@@ -38,7 +38,11 @@ pub(super) fn row_minimum(row: &[[f64; LANES]], values: &[[f64; LANES]]) -> f64 
     for (costs, values) in row.iter().zip(values) {
         for lane in 0..LANES {
             let reduced = costs[lane] - values[lane];
-            least[lane] = if least[lane] < reduced { least[lane] } else { reduced };
+            least[lane] = if least[lane] < reduced {
+                least[lane]
+            } else {
+                reduced
+            };
         }
     }
     let mut smallest = least[0];
@@ -75,7 +79,12 @@ pub(super) struct StartMemory {
 
 impl StartMemory {
     /// Potentials under which all steps' pairs are tight.
-    pub(super) fn tree_duals(&self, matrix: &CostMatrix, source_duals: &mut [f64], target_duals: &mut [[f64; LANES]]) {
+    pub(super) fn tree_duals(
+        &self,
+        matrix: &CostMatrix,
+        source_duals: &mut [f64],
+        target_duals: &mut [[f64; LANES]],
+    ) {
         let target_duals = target_duals.as_flattened_mut();
         for (k, &step) in self.steps.iter().rev().enumerate() {
             match step {
@@ -96,8 +105,24 @@ impl StartMemory {
 /// The steps as flows, in their order.
 pub(super) fn steps_as_flows(steps: &[Closing]) -> impl Iterator<Item = Flow> + '_ {
     steps.iter().map(|&step| match step {
-        Closing::Source { closed, parent, grains } => Flow { source: closed, target: parent, grains },
-        Closing::Target { closed, parent, grains } => Flow { source: parent, target: closed, grains },
+        Closing::Source {
+            closed,
+            parent,
+            grains,
+        } => Flow {
+            source: closed,
+            target: parent,
+            grains,
+        },
+        Closing::Target {
+            closed,
+            parent,
+            grains,
+        } => Flow {
+            source: parent,
+            target: closed,
+            grains,
+        },
     })
 }
 
@@ -119,13 +144,21 @@ pub(super) fn mean_costs(matrix: &CostMatrix, units: &Units, means: &mut [[f64; 
     let share = 1.0 / f64::max(weights, 1.0);
     for (target, mean) in means.as_flattened_mut().iter_mut().enumerate() {
         // The padding costs infinity, and infinity less infinity is no number.
-        *mean = if target < units.demands.len() { *mean * share } else { 0.0 };
+        *mean = if target < units.demands.len() {
+            *mean * share
+        } else {
+            0.0
+        };
     }
 }
 
 /// Lists the steps of the start.
 pub(super) fn greedy_start(matrix: &CostMatrix, units: &Units, memory: &mut StartMemory) {
-    let StartMemory { steps, values, left } = memory;
+    let StartMemory {
+        steps,
+        values,
+        left,
+    } = memory;
     let sources = units.supplies.len();
     values.clear();
     values.resize(matrix.stride(), [0.0; LANES]);
@@ -143,13 +176,21 @@ pub(super) fn greedy_start(matrix: &CostMatrix, units: &Units, memory: &mut Star
             // One target stays open to the end: it is the root, and takes what is left.
             if open == 1 || supply < demand && source + 1 < sources {
                 left[target] = demand - supply;
-                steps.push(Closing::Source { closed: source, parent: target, grains: supply });
+                steps.push(Closing::Source {
+                    closed: source,
+                    parent: target,
+                    grains: supply,
+                });
                 break;
             }
             supply -= demand;
             open -= 1;
             values.as_flattened_mut()[target] = f64::NEG_INFINITY;
-            steps.push(Closing::Target { closed: target, parent: source, grains: demand });
+            steps.push(Closing::Target {
+                closed: target,
+                parent: source,
+                grains: demand,
+            });
         }
     }
 }

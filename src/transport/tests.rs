@@ -54,7 +54,9 @@ fn cloud() -> impl Strategy<Value = Vec<([f64; 3], f64)>> {
 
 fn problem(source: &[([f64; 3], f64)], target: &[([f64; 3], f64)]) -> Problem {
     let mut problem = Problem::default();
-    problem.refill(source.iter().copied(), target.iter().copied()).expect("a fine problem");
+    problem
+        .refill(source.iter().copied(), target.iter().copied())
+        .expect("a fine problem");
     problem
 }
 
@@ -90,11 +92,19 @@ fn certified(problem: &Problem, cost: Cost, plan: &Plan) -> Result<(), TestCaseE
         sent[entry.source] += entry.mass;
         arrived[entry.target] += entry.mass;
     }
-    for (got, want) in sent.iter().zip(from.masses()).chain(arrived.iter().zip(to.masses())) {
+    for (got, want) in sent
+        .iter()
+        .zip(from.masses())
+        .chain(arrived.iter().zip(to.masses()))
+    {
         prop_assert!((got - want).abs() < 1e-12, "{got} for {want}");
     }
     let order = |entry: &PlanEntry| (entry.source, entry.target);
-    prop_assert!(plan.entries.windows(2).all(|two| order(&two[0]) < order(&two[1])));
+    prop_assert!(
+        plan.entries
+            .windows(2)
+            .all(|two| order(&two[0]) < order(&two[1]))
+    );
     Ok(())
 }
 
@@ -104,21 +114,40 @@ fn grey_clouds_that_do_not_overlap_move_in_order() {
     let source = [(30.0, 0.25), (10.0, 0.25), (20.0, 0.25), (0.0, 0.25)];
     let target = [(70.0, 0.25), (60.0, 0.25), (90.0, 0.25), (80.0, 0.25)];
     let plan = exact(&line_problem(&source, &target), Cost::Distance);
-    let moved: Vec<_> = plan.entries.iter().map(|e| (source[e.source].0, target[e.target].0)).collect();
-    assert_eq!(moved, [(30.0, 90.0), (10.0, 70.0), (20.0, 80.0), (0.0, 60.0)]);
+    let moved: Vec<_> = plan
+        .entries
+        .iter()
+        .map(|e| (source[e.source].0, target[e.target].0))
+        .collect();
+    assert_eq!(
+        moved,
+        [(30.0, 90.0), (10.0, 70.0), (20.0, 80.0), (0.0, 60.0)]
+    );
     assert!(close(plan.cost, 60.0), "{}", plan.cost);
 }
 
 #[test]
 fn one_point_a_side_is_a_plan() {
-    let plan = exact(&line_problem(&[(3.0, 7.0)], &[(5.0, 1e-200)]), Cost::SquaredDistance);
-    assert_eq!(plan.entries, [PlanEntry { source: 0, target: 0, mass: 1.0 }]);
+    let plan = exact(
+        &line_problem(&[(3.0, 7.0)], &[(5.0, 1e-200)]),
+        Cost::SquaredDistance,
+    );
+    assert_eq!(
+        plan.entries,
+        [PlanEntry {
+            source: 0,
+            target: 0,
+            mass: 1.0
+        }]
+    );
     assert!(close(plan.cost, 4.0));
 }
 
 #[test]
 fn a_cloud_onto_itself_stays_where_it_is() {
-    let cloud: Vec<_> = (1..40).map(|i| (f64::from(i * 7 % 41), f64::from(i).recip())).collect();
+    let cloud: Vec<_> = (1..40)
+        .map(|i| (f64::from(i * 7 % 41), f64::from(i).recip()))
+        .collect();
     let problem = line_problem(&cloud, &cloud);
     for cost in [Cost::Distance, Cost::SquaredDistance] {
         let plan = exact(&problem, cost);
@@ -136,8 +165,13 @@ fn tiny_masses_arrive_as_themselves() {
     let source = [(0.0, 1e-300), (1.0, 0.5), (2.0, 0.5), (3.0, 1e-30)];
     let target = [(5.0, 0.3), (6.0, 1e-200), (7.0, 0.7)];
     let plan = exact(&line_problem(&source, &target), Cost::Distance);
-    let sum_of =
-        |want: &dyn Fn(&PlanEntry) -> bool| -> f64 { plan.entries.iter().filter(|e| want(e)).map(|e| e.mass).sum() };
+    let sum_of = |want: &dyn Fn(&PlanEntry) -> bool| -> f64 {
+        plan.entries
+            .iter()
+            .filter(|e| want(e))
+            .map(|e| e.mass)
+            .sum()
+    };
     assert!((sum_of(&|e| e.source == 0) / 1e-300 - 1.0).abs() < 1e-12);
     assert!((sum_of(&|e| e.source == 3) / 1e-30 - 1.0).abs() < 1e-12);
     assert!((sum_of(&|e| e.target == 1) / 1e-200 - 1.0).abs() < 1e-12);
@@ -148,11 +182,23 @@ fn clouds_of_every_tree_width_are_solved() {
     let mut workspace = Workspace::default();
     for size in [63, 64, 65, 128, 129, 257, 513, 1025] {
         let spread = |step: f64| -> Vec<(f64, f64)> {
-            (0..size).map(|i| ((f64::from(i) * step).fract() * 100.0, 1.0 + f64::from(i % 7))).collect()
+            (0..size)
+                .map(|i| {
+                    (
+                        (f64::from(i) * step).fract() * 100.0,
+                        1.0 + f64::from(i % 7),
+                    )
+                })
+                .collect()
         };
         let (source, target) = (spread(0.618_034), spread(0.414_214)[..40].to_vec());
-        let plan = solve(&line_problem(&source, &target), Method::Exact, Cost::SquaredDistance, &mut workspace)
-            .expect("solved");
+        let plan = solve(
+            &line_problem(&source, &target),
+            Method::Exact,
+            Cost::SquaredDistance,
+            &mut workspace,
+        )
+        .expect("solved");
         let want = closed_form(&source, &target, 2);
         assert!(close(plan.cost, want), "{size}: {} for {want}", plan.cost);
     }
@@ -176,8 +222,16 @@ fn costs_grow_with_the_scale_from_atoms_to_galaxies() {
         for scale in [1e-60_f64, 1e-12, 1e12, 1e99] {
             let plan = exact(&scaled(scale), cost);
             let factor = scale.powi(power);
-            assert!(close(plan.cost / factor, one.cost), "{scale:e}: {}", plan.cost);
-            assert!(plan.gap / factor <= 1e-9 * one.cost, "{scale:e}: {:e}", plan.gap);
+            assert!(
+                close(plan.cost / factor, one.cost),
+                "{scale:e}: {}",
+                plan.cost
+            );
+            assert!(
+                plan.gap / factor <= 1e-9 * one.cost,
+                "{scale:e}: {:e}",
+                plan.gap
+            );
         }
     }
 }
@@ -186,13 +240,23 @@ fn costs_grow_with_the_scale_from_atoms_to_galaxies() {
 fn an_earlier_problem_leaves_no_trace() {
     let easy = line_problem(&[(1.0, 1.0)], &[(2.0, 0.5), (3.0, 0.5)]);
     let hard = line_problem(
-        &(0..50).map(|i| (f64::from(i * 37 % 50), 1.0)).collect::<Vec<_>>(),
-        &(0..30).map(|i| (f64::from(i * 11 % 30), 2.0)).collect::<Vec<_>>(),
+        &(0..50)
+            .map(|i| (f64::from(i * 37 % 50), 1.0))
+            .collect::<Vec<_>>(),
+        &(0..30)
+            .map(|i| (f64::from(i * 11 % 30), 2.0))
+            .collect::<Vec<_>>(),
     );
-    let methods = [Method::Exact, Method::Greedy, Method::LinearProgram, Method::Sinkhorn { epsilon: 0.1 }];
+    let methods = [
+        Method::Exact,
+        Method::Greedy,
+        Method::LinearProgram,
+        Method::Sinkhorn { epsilon: 0.1 },
+    ];
     let mut used = Workspace::default();
     for method in methods {
-        let fresh = solve(&hard, method, Cost::Distance, &mut Workspace::default()).expect("solved");
+        let fresh =
+            solve(&hard, method, Cost::Distance, &mut Workspace::default()).expect("solved");
         solve(&easy, Method::Exact, Cost::SquaredDistance, &mut used).expect("solved");
         let again = solve(&hard, method, Cost::Distance, &mut used).expect("solved");
         assert_eq!(fresh, again, "{method:?}");
@@ -203,21 +267,44 @@ fn an_earlier_problem_leaves_no_trace() {
 fn an_unfilled_problem_and_a_senseless_smoothing_are_refused() {
     let mut workspace = Workspace::default();
     let empty = Problem::default();
-    for method in [Method::Exact, Method::Greedy, Method::LinearProgram, Method::Sinkhorn { epsilon: 0.1 }] {
-        assert_eq!(solve(&empty, method, Cost::Distance, &mut workspace), Err(TransportError::Empty(Side::Source)));
+    for method in [
+        Method::Exact,
+        Method::Greedy,
+        Method::LinearProgram,
+        Method::Sinkhorn { epsilon: 0.1 },
+    ] {
+        assert_eq!(
+            solve(&empty, method, Cost::Distance, &mut workspace),
+            Err(TransportError::Empty(Side::Source))
+        );
     }
     let problem = line_problem(&[(0.0, 1.0)], &[(1.0, 1.0)]);
     for epsilon in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-10] {
-        let refused = solve(&problem, Method::Sinkhorn { epsilon }, Cost::Distance, &mut workspace);
-        assert!(matches!(refused, Err(TransportError::Epsilon(_))), "{epsilon}: {refused:?}");
+        let refused = solve(
+            &problem,
+            Method::Sinkhorn { epsilon },
+            Cost::Distance,
+            &mut workspace,
+        );
+        assert!(
+            matches!(refused, Err(TransportError::Epsilon(_))),
+            "{epsilon}: {refused:?}"
+        );
     }
 }
 
 #[test]
 fn methods_are_stored_in_snake_case() {
-    let text = serde_json::to_string(&[Method::Exact, Method::Sinkhorn { epsilon: 0.01 }, Method::LinearProgram])
-        .expect("written");
-    assert_eq!(text, r#"["exact",{"sinkhorn":{"epsilon":0.01}},"linear_program"]"#);
+    let text = serde_json::to_string(&[
+        Method::Exact,
+        Method::Sinkhorn { epsilon: 0.01 },
+        Method::LinearProgram,
+    ])
+    .expect("written");
+    assert_eq!(
+        text,
+        r#"["exact",{"sinkhorn":{"epsilon":0.01}},"linear_program"]"#
+    );
     let cost: Cost = serde_json::from_str(r#""squared_distance""#).expect("read");
     assert_eq!(cost, Cost::SquaredDistance);
 }
@@ -226,22 +313,41 @@ fn methods_are_stored_in_snake_case() {
 fn sinkhorn_keeps_its_promise_or_says_that_it_cannot() {
     let wave = |i: i32, f: f64| (f64::from(i) * f).sin() * 40.0;
     let cloud = |f: f64| -> Vec<([f64; 3], f64)> {
-        (1..=20).map(|i| ([wave(i, f), wave(i, 2.0 * f), wave(i, 3.0 * f)], f64::from(i).powi(-2))).collect()
+        (1..=20)
+            .map(|i| {
+                (
+                    [wave(i, f), wave(i, 2.0 * f), wave(i, 3.0 * f)],
+                    f64::from(i).powi(-2),
+                )
+            })
+            .collect()
     };
     let problem = problem(&cloud(0.7), &cloud(1.1));
     let optimum = exact(&problem, Cost::Distance).cost;
     let mut converged = 0;
     for exponent in 0..=8 {
         let epsilon = 10.0_f64.powi(-exponent);
-        match solve(&problem, Method::Sinkhorn { epsilon }, Cost::Distance, &mut Workspace::default()) {
+        match solve(
+            &problem,
+            Method::Sinkhorn { epsilon },
+            Cost::Distance,
+            &mut Workspace::default(),
+        ) {
             Ok(plan) => {
                 converged += 1;
                 assert!(plan.cost >= optimum * (1.0 - 1e-9), "{epsilon}");
                 assert!(plan.cost - plan.gap <= optimum * (1.0 + 1e-9), "{epsilon}");
                 // A smoothing of ε·mean over at most ln(20²) nats of entropy, and the mass that rounding moves.
-                assert!(plan.cost - optimum <= 6.0 * epsilon * 60.0 + 1e-3, "{epsilon}: {}", plan.cost);
+                assert!(
+                    plan.cost - optimum <= 6.0 * epsilon * 60.0 + 1e-3,
+                    "{epsilon}: {}",
+                    plan.cost
+                );
             }
-            Err(error) => assert!(matches!(error, TransportError::NotConverged { .. }), "{error}"),
+            Err(error) => assert!(
+                matches!(error, TransportError::NotConverged { .. }),
+                "{error}"
+            ),
         }
     }
     assert!(converged >= 3, "only {converged} of 9 converged");

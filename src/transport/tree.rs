@@ -14,7 +14,10 @@ pub(super) struct PointSet<const W: usize> {
 }
 
 impl<const W: usize> PointSet<W> {
-    const EMPTY: Self = Self { sources: [0; W], targets: [0; W] };
+    const EMPTY: Self = Self {
+        sources: [0; W],
+        targets: [0; W],
+    };
 
     #[inline]
     fn join(&mut self, other: &Self) {
@@ -95,7 +98,11 @@ pub(super) struct Tree<const W: usize> {
 impl<const W: usize> Tree<W> {
     /// Builds the tree from the steps of a start.
     pub(super) fn plant(&mut self, sources: usize, targets: usize, steps: &[Closing]) {
-        let leaf = Branch { parent: 0, flow: 0, below: PointSet::EMPTY };
+        let leaf = Branch {
+            parent: 0,
+            flow: 0,
+            below: PointSet::EMPTY,
+        };
         self.sources.clear();
         self.sources.resize(sources, leaf);
         self.targets.clear();
@@ -108,7 +115,11 @@ impl<const W: usize> Tree<W> {
         }
         for &step in steps {
             match step {
-                Closing::Source { closed, parent, grains } => {
+                Closing::Source {
+                    closed,
+                    parent,
+                    grains,
+                } => {
                     let branch = &mut self.sources[closed];
                     branch.parent = parent;
                     branch.flow = grains;
@@ -116,7 +127,11 @@ impl<const W: usize> Tree<W> {
                     self.targets[parent].below.join(&below);
                     self.root = parent;
                 }
-                Closing::Target { closed, parent, grains } => {
+                Closing::Target {
+                    closed,
+                    parent,
+                    grains,
+                } => {
                     let branch = &mut self.targets[closed];
                     branch.parent = parent;
                     branch.flow = grains;
@@ -176,11 +191,20 @@ impl<const W: usize> Tree<W> {
             at = branch.parent;
             target_way += 1;
         }
-        let cycle = Cycle { flow: least, leaving };
+        let cycle = Cycle {
+            flow: least,
+            leaving,
+        };
         let moved = if with_source {
-            cycle.swing((&mut self.sources, source, source_way), (&mut self.targets, target, target_way))
+            cycle.swing(
+                (&mut self.sources, source, source_way),
+                (&mut self.targets, target, target_way),
+            )
         } else {
-            cycle.swing((&mut self.targets, target, target_way), (&mut self.sources, source, source_way))
+            cycle.swing(
+                (&mut self.targets, target, target_way),
+                (&mut self.sources, source, source_way),
+            )
         };
         Swing { moved, with_source }
     }
@@ -218,7 +242,11 @@ impl<const W: usize> Tree<W> {
             let mut edges = *below;
             insert(&mut edges, parent);
             for_each_point(&edges, |target| {
-                let flow = if target == parent { branch.flow } else { self.targets[target].flow };
+                let flow = if target == parent {
+                    branch.flow
+                } else {
+                    self.targets[target].flow
+                };
                 visit(source, target, flow);
             });
         }
@@ -280,7 +308,11 @@ impl Cycle {
 
         // The way from the start to the leaving edge turns round: who was above hangs below now.
         let mut at = start;
-        let mut turned = Branch { parent: partner, flow: self.flow, below: moved };
+        let mut turned = Branch {
+            parent: partner,
+            flow: self.flow,
+            below: moved,
+        };
         let mut above = loop {
             let old = std::mem::replace(&mut near[at], turned);
             near_way -= 1;
@@ -290,10 +322,18 @@ impl Cycle {
             }
             let old_up = std::mem::replace(
                 &mut far[up],
-                Branch { parent: at, flow: old.flow - self.flow, below: moved.without(&old.below) },
+                Branch {
+                    parent: at,
+                    flow: old.flow - self.flow,
+                    below: moved.without(&old.below),
+                },
             );
             near_way -= 1;
-            turned = Branch { parent: old.parent, flow: old_up.flow + self.flow, below: moved.without(&old_up.below) };
+            turned = Branch {
+                parent: old.parent,
+                flow: old_up.flow + self.flow,
+                below: moved.without(&old_up.below),
+            };
             at = old_up.parent;
         };
 

@@ -47,15 +47,26 @@ impl Units {
         count(problem.source(), sum_bits, &mut self.supplies);
         count(problem.target(), sum_bits, &mut self.demands);
         self.source_mass.clear();
-        self.source_mass.extend(
-            self.supplies
-                .iter()
-                .zip(problem.source().masses())
-                .map(|(&units, &mass)| if units < LIGHT { mass / units as f64 } else { 0.0 }),
-        );
+        self.source_mass
+            .extend(
+                self.supplies
+                    .iter()
+                    .zip(problem.source().masses())
+                    .map(|(&units, &mass)| {
+                        if units < LIGHT {
+                            mass / units as f64
+                        } else {
+                            0.0
+                        }
+                    }),
+            );
         self.target_mass.clear();
-        self.target_mass
-            .extend(self.demands.iter().zip(problem.target().masses()).map(|(&units, &mass)| mass / units as f64));
+        self.target_mass.extend(
+            self.demands
+                .iter()
+                .zip(problem.target().masses())
+                .map(|(&units, &mass)| mass / units as f64),
+        );
         for supply in &mut self.supplies {
             *supply = (*supply << self.shift) + 1;
         }
@@ -74,7 +85,11 @@ impl Units {
             return None;
         }
         let own = self.source_mass[source];
-        let per_unit = if own > 0.0 { own } else { self.target_mass[target] };
+        let per_unit = if own > 0.0 {
+            own
+        } else {
+            self.target_mass[target]
+        };
         Some((units as f64 * per_unit).max(f64::MIN_POSITIVE))
     }
 }
@@ -103,8 +118,13 @@ mod tests {
 
     fn units(source: &[f64], target: &[f64]) -> Units {
         let points = vec![[0.0; 3]; source.len().max(target.len())];
-        let problem =
-            Problem::new(&points[..source.len()], source, &points[..target.len()], target).expect("positive masses");
+        let problem = Problem::new(
+            &points[..source.len()],
+            source,
+            &points[..target.len()],
+            target,
+        )
+        .expect("positive masses");
         let mut units = Units::default();
         units.fill(&problem);
         units
@@ -113,7 +133,10 @@ mod tests {
     #[test]
     fn both_sides_hold_the_same_number_of_grains() {
         let units = units(&[0.1; 7], &[1e-300, 0.3, 0.7, 1e-20]);
-        assert_eq!(units.supplies.iter().sum::<i64>(), units.demands.iter().sum::<i64>());
+        assert_eq!(
+            units.supplies.iter().sum::<i64>(),
+            units.demands.iter().sum::<i64>()
+        );
         assert!(units.supplies.iter().chain(&units.demands).all(|&n| n > 0));
     }
 
@@ -122,9 +145,16 @@ mod tests {
         let units = units(&[0.25; 4], &[0.25; 4]);
         for sources in 1_u32..15 {
             for targets in 1_u32..15 {
-                let part =
-                    |grains: &[i64], set: u32| -> i64 { (0..4).filter(|i| set >> i & 1 == 1).map(|i| grains[i]).sum() };
-                assert_ne!(part(&units.supplies, sources), part(&units.demands, targets));
+                let part = |grains: &[i64], set: u32| -> i64 {
+                    (0..4)
+                        .filter(|i| set >> i & 1 == 1)
+                        .map(|i| grains[i])
+                        .sum()
+                };
+                assert_ne!(
+                    part(&units.supplies, sources),
+                    part(&units.demands, targets)
+                );
             }
         }
     }

@@ -29,16 +29,27 @@ pub(super) fn vertex_below(
     plan: &mut Plan,
 ) {
     let mut left = units.clone();
-    #[expect(clippy::cast_precision_loss, reason = "what is cut off goes with the leftovers")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "what is cut off goes with the leftovers"
+    )]
     let grains_in_all = units.supplies.iter().sum::<i64>() as f64;
     let mut flows = Vec::new();
     for (source, target, mass) in masses {
-        #[expect(clippy::cast_possible_truncation, reason = "beyond i64 it saturates, NaN counts as nothing")]
-        let grains = ((mass * grains_in_all) as i64).clamp(0, left.supplies[source].min(left.demands[target]));
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "beyond i64 it saturates, NaN counts as nothing"
+        )]
+        let grains = ((mass * grains_in_all) as i64)
+            .clamp(0, left.supplies[source].min(left.demands[target]));
         if grains > 0 {
             left.supplies[source] -= grains;
             left.demands[target] -= grains;
-            flows.push(Flow { source, target, grains });
+            flows.push(Flow {
+                source,
+                target,
+                grains,
+            });
         }
     }
     greedy_start(matrix, &left, start);
@@ -109,7 +120,11 @@ struct Forest {
 
 impl Forest {
     fn new(sources: usize, targets: usize) -> Self {
-        Self { sources, edges: vec![Vec::new(); sources + targets], reached: vec![None; sources + targets] }
+        Self {
+            sources,
+            edges: vec![Vec::new(); sources + targets],
+            reached: vec![None; sources + targets],
+        }
     }
 
     /// Takes in a flow; keeps the forest a forest.
@@ -130,7 +145,11 @@ impl Forest {
         };
         let mut change = matrix.at(flow.source, flow.target);
         for (step, pair) in way.windows(2).enumerate() {
-            change += if step.is_multiple_of(2) { -cost(pair) } else { cost(pair) };
+            change += if step.is_multiple_of(2) {
+                -cost(pair)
+            } else {
+                cost(pair)
+            };
         }
         let raise = change < 0.0;
         let falls = |step: usize| step.is_multiple_of(2) == raise;
@@ -143,11 +162,22 @@ impl Forest {
         for (step, pair) in way.windows(2).enumerate() {
             self.add(pair[0], pair[1], if falls(step) { -turn } else { turn });
         }
-        self.add(from, to, if raise { flow.grains + turn } else { flow.grains - turn });
+        self.add(
+            from,
+            to,
+            if raise {
+                flow.grains + turn
+            } else {
+                flow.grains - turn
+            },
+        );
     }
 
     fn grains(&self, a: usize, b: usize) -> i64 {
-        self.edges[a].iter().find(|edge| edge.to == b).map_or(0, |edge| edge.grains)
+        self.edges[a]
+            .iter()
+            .find(|edge| edge.to == b)
+            .map_or(0, |edge| edge.grains)
     }
 
     /// Adds grains to an edge, which comes and goes with its flow.
@@ -205,17 +235,24 @@ mod tests {
             (0..12)
                 .map(|i| {
                     let t = f64::from(i);
-                    [t * 1.7 + shift, (t * 2.3).sin() * 9.0, (t * 0.9).cos() * 5.0]
+                    [
+                        t * 1.7 + shift,
+                        (t * 2.3).sin() * 9.0,
+                        (t * 0.9).cos() * 5.0,
+                    ]
                 })
                 .collect()
         };
         let masses: Vec<f64> = (1..=12).map(f64::from).collect();
-        let problem = Problem::new(&points(0.0), &masses, &points(4.0), &masses).expect("a fine problem");
+        let problem =
+            Problem::new(&points(0.0), &masses, &points(4.0), &masses).expect("a fine problem");
         let mut workspace = Workspace::default();
         workspace.prepare(&problem, Cost::Distance);
         let (p, q) = (problem.source().masses(), problem.target().masses());
         let product = || (0..12).flat_map(|i| (0..12).map(move |j| (i, j)));
-        let dense: f64 = product().map(|(i, j)| p[i] * q[j] * workspace.matrix.at(i, j)).sum();
+        let dense: f64 = product()
+            .map(|(i, j)| p[i] * q[j] * workspace.matrix.at(i, j))
+            .sum();
         let mut plan = Plan::default();
         vertex_below(
             &problem,

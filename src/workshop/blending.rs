@@ -26,17 +26,25 @@ pub fn blend_paints(
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Blended, WorkshopError> {
     let mut notes = Vec::new();
-    let reduced: Vec<Option<CarPaint>> =
-        paints.iter().map(|file| reduced(file, profile.flakes.clusters, &mut notes)).collect();
+    let reduced: Vec<Option<CarPaint>> = paints
+        .iter()
+        .map(|file| reduced(file, profile.flakes.clusters, &mut notes))
+        .collect();
     let ingredients: Vec<Ingredient<'_>> = paints
         .iter()
         .zip(&reduced)
-        .map(|(file, reduced)| Ingredient { name: &file.name, paint: reduced.as_ref().unwrap_or(&file.paint) })
+        .map(|(file, reduced)| Ingredient {
+            name: &file.name,
+            paint: reduced.as_ref().unwrap_or(&file.paint),
+        })
         .collect();
-    let blend = Blend::new(&ingredients, &profile.blend, progress).map_err(|error| match error {
-        BlendError::Paints(_) | BlendError::Angles { .. } => WorkshopError::usage("paints", error),
-        _ => WorkshopError::internal(error),
-    })?;
+    let blend =
+        Blend::new(&ingredients, &profile.blend, progress).map_err(|error| match error {
+            BlendError::Paints(_) | BlendError::Angles { .. } => {
+                WorkshopError::usage("paints", error)
+            }
+            _ => WorkshopError::internal(error),
+        })?;
     let by_hash: Vec<&str> = blend.paints.iter().map(|p| p.name.as_str()).collect();
     let report = blend.report();
     for &place in &report.mixed {
@@ -46,14 +54,28 @@ pub fn blend_paints(
         ));
     }
     for &place in &report.without_flakes {
-        notes.push(format!("{}: has no flakes and counts as black ones", by_hash[place]));
+        notes.push(format!(
+            "{}: has no flakes and counts as black ones",
+            by_hash[place]
+        ));
     }
     Ok(Blended { blend, notes })
 }
 
 /// The paint with at most `most` clusters a slice, if it came from a blend and has more.
 fn reduced(file: &PaintFile, most: usize, notes: &mut Vec<String>) -> Option<CarPaint> {
-    let flakes = file.paint.flakes.as_ref().filter(|f| file.provenance.source == "blend" && f.widest_slice() > most)?;
-    notes.push(format!("{}: up to {} clusters a slice were reduced to {most}", file.name, flakes.widest_slice()));
-    Some(CarPaint { flakes: Some(reduce_clusters(flakes, most)), ..file.paint.clone() })
+    let flakes = file
+        .paint
+        .flakes
+        .as_ref()
+        .filter(|f| file.provenance.source == "blend" && f.widest_slice() > most)?;
+    notes.push(format!(
+        "{}: up to {} clusters a slice were reduced to {most}",
+        file.name,
+        flakes.widest_slice()
+    ));
+    Some(CarPaint {
+        flakes: Some(reduce_clusters(flakes, most)),
+        ..file.paint.clone()
+    })
 }

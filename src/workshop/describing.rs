@@ -14,7 +14,9 @@ pub fn describe_paint(file: &PaintFile) -> Value {
         .iter()
         .zip(instrument_pairs())
         .map(|(angle, (wi, wo))| {
-            let factor = reflectance.evaluate(wi, wo, Chi::Table).map(|f| f * std::f64::consts::PI);
+            let factor = reflectance
+                .evaluate(wi, wo, Chi::Table)
+                .map(|f| f * std::f64::consts::PI);
             let lab = crate::color::Lab::from_rgb(factor);
             json!({ "aspecular_deg": angle, "L": lab.l, "a": lab.a, "b": lab.b })
         })
@@ -52,7 +54,10 @@ pub fn describe_paint(file: &PaintFile) -> Value {
 /// Ingredients, settings and correspondence of a blend.
 #[must_use]
 pub fn describe_blend(blend: &Blend) -> Value {
-    let paints: Vec<Value> = blend.ingredients().map(|(name, hash)| json!({ "name": name, "hash": hash })).collect();
+    let paints: Vec<Value> = blend
+        .ingredients()
+        .map(|(name, hash)| json!({ "name": name, "hash": hash }))
+        .collect();
     json!({
         "paints": paints,
         "weights": format!("{} numbers, in this order", blend.len()),

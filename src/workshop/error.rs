@@ -30,22 +30,38 @@ pub struct WorkshopError {
 impl WorkshopError {
     /// A request that does not fit together.
     pub fn usage(field: &str, message: impl Display) -> Self {
-        Self { fault: Fault::Usage, field: Some(field.to_owned()), message: message.to_string() }
+        Self {
+            fault: Fault::Usage,
+            field: Some(field.to_owned()),
+            message: message.to_string(),
+        }
     }
 
     /// A file that is not what it should be; `name` is what the caller knows it by.
     pub fn input(name: impl Display, problem: impl Display) -> Self {
-        Self { fault: Fault::Input, field: None, message: format!("{name}: {problem}") }
+        Self {
+            fault: Fault::Input,
+            field: None,
+            message: format!("{name}: {problem}"),
+        }
     }
 
     /// An answer that could not be written.
     pub fn output(name: impl Display, problem: impl Display) -> Self {
-        Self { fault: Fault::Output, field: None, message: format!("{name}: {problem}") }
+        Self {
+            fault: Fault::Output,
+            field: None,
+            message: format!("{name}: {problem}"),
+        }
     }
 
     /// A bug.
     pub fn internal(problem: impl Display) -> Self {
-        Self { fault: Fault::Internal, field: None, message: problem.to_string() }
+        Self {
+            fault: Fault::Internal,
+            field: None,
+            message: problem.to_string(),
+        }
     }
 }
 

@@ -6,7 +6,8 @@ use super::WorkshopError;
 use super::ingest::{Measurement, table_of};
 use crate::measurement::{FlakePictures as _, MeasuredBrdf as _, Package, PackageBase};
 use crate::paint::{
-    CarPaint, Chi, Direction, HalfAngles, Limits, Reflectance, at_angles, fresnel, half_angles, refract,
+    CarPaint, Chi, Direction, HalfAngles, Limits, Reflectance, at_angles, fresnel, half_angles,
+    refract,
 };
 
 /// Direction pairs to evaluate.
@@ -35,17 +36,25 @@ impl Pairs {
     /// [`WorkshopError`] for JSON that is none, too many pairs, or a vector that is not of unit length to 1e-3.
     pub fn from_json(name: &str, json: &[u8], limits: &Limits) -> Result<Self, WorkshopError> {
         let mut pairs: Self = serde_json::from_slice(json).map_err(|e| {
-            WorkshopError::input(name, format!("{e}; accepted is {{\"pairs\": [[[ix,iy,iz],[ox,oy,oz]], …]}}"))
+            WorkshopError::input(
+                name,
+                format!("{e}; accepted is {{\"pairs\": [[[ix,iy,iz],[ox,oy,oz]], …]}}"),
+            )
         })?;
         if pairs.pairs.len() > limits.pairs {
-            let problem = format!("{} pairs, accepted are up to {}", pairs.pairs.len(), limits.pairs);
+            let problem = format!(
+                "{} pairs, accepted are up to {}",
+                pairs.pairs.len(),
+                limits.pairs
+            );
             return Err(WorkshopError::input(name, problem));
         }
         for (k, pair) in pairs.pairs.iter_mut().enumerate() {
             for (end, w) in pair.iter_mut().enumerate() {
                 let length = (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]).sqrt();
                 if (length - 1.0).abs() > 1e-3 || !length.is_finite() {
-                    let problem = format!("pairs[{k}][{end}] has length {length}, accepted are unit vectors");
+                    let problem =
+                        format!("pairs[{k}][{end}] has length {length}, accepted are unit vectors");
                     return Err(WorkshopError::input(name, problem));
                 }
                 *w = w.map(|v| v / length);
@@ -59,11 +68,24 @@ impl Pairs {
 #[must_use]
 pub fn evaluate(paint: &CarPaint, pairs: &Pairs, chi: Chi) -> Values {
     let reflectance = Reflectance::new(paint);
-    let f = pairs.pairs.iter().map(|&[wi, wo]| Some(reflectance.evaluate(wi, wo, chi))).collect();
-    let mirror = paint
-        .coat
-        .filter(crate::paint::Coat::is_mirror)
-        .map(|_| pairs.pairs.iter().map(|&[wi, wo]| if wi[2] > 0.0 { reflectance.mirror(wo) } else { 0.0 }).collect());
+    let f = pairs
+        .pairs
+        .iter()
+        .map(|&[wi, wo]| Some(reflectance.evaluate(wi, wo, chi)))
+        .collect();
+    let mirror = paint.coat.filter(crate::paint::Coat::is_mirror).map(|_| {
+        pairs
+            .pairs
+            .iter()
+            .map(|&[wi, wo]| {
+                if wi[2] > 0.0 {
+                    reflectance.mirror(wo)
+                } else {
+                    0.0
+                }
+            })
+            .collect()
+    });
     Values { f, mirror }
 }
 
@@ -75,7 +97,11 @@ pub fn evaluate(paint: &CarPaint, pairs: &Pairs, chi: Chi) -> Values {
 /// [`WorkshopError`] for a package whose table or pictures are damaged.
 pub fn evaluate_raw(measurement: &Measurement, pairs: &Pairs) -> Result<Values, WorkshopError> {
     let f = match measurement {
-        Measurement::Brdf(brdf, _) => pairs.pairs.iter().map(|&[wi, wo]| brdf.reflectance(wi, wo)).collect(),
+        Measurement::Brdf(brdf, _) => pairs
+            .pairs
+            .iter()
+            .map(|&[wi, wo]| brdf.reflectance(wi, wo))
+            .collect(),
         Measurement::Package(package) => raw_package(package, pairs)?,
     };
     Ok(Values { f, mirror: None })
@@ -83,8 +109,12 @@ pub fn evaluate_raw(measurement: &Measurement, pairs: &Pairs) -> Result<Values, 
 
 fn raw_package(package: &Package, pairs: &Pairs) -> Result<Vec<Option<[f64; 3]>>, WorkshopError> {
     let wrong = |problem: &dyn std::fmt::Display| WorkshopError::input(&package.name, problem);
-    let means =
-        package.flakes.as_ref().map(crate::measurement::FlakeSlices::mean_colors).transpose().map_err(|e| wrong(&e))?;
+    let means = package
+        .flakes
+        .as_ref()
+        .map(crate::measurement::FlakeSlices::mean_colors)
+        .transpose()
+        .map_err(|e| wrong(&e))?;
     let flakes = |half: &HalfAngles| match (&package.flakes, &means) {
         (Some(slices), Some(means)) => at_angles(means, slices.theta_h(), slices.theta_d(), half),
         _ => [0.0; 3],
@@ -92,15 +122,30 @@ fn raw_package(package: &Package, pairs: &Pairs) -> Result<Vec<Option<[f64; 3]>>
     let (coat, ior) = (package.coat, package.coat.map_or(1.0, |c| c.ior));
     let through = |wi: Direction, wo: Direction, base: [f64; 3]| {
         let inner = half_angles(refract(wi, ior), refract(wo, ior));
-        let (transmission, flakes) = ((1.0 - fresnel(wi[2], ior)) * (1.0 - fresnel(wo[2], ior)), flakes(&inner));
+        let (transmission, flakes) = (
+            (1.0 - fresnel(wi[2], ior)) * (1.0 - fresnel(wo[2], ior)),
+            flakes(&inner),
+        );
         std::array::from_fn(|k| transmission * (base[k] + flakes[k]))
     };
     let above = |w: Direction| w[2] > 0.0;
     match &package.base {
-        None => Err(wrong(&"base: there is neither a model nor a brdf_table to evaluate")),
-        Some(PackageBase::Model { diffuse, lobes, color_table }) => {
+        None => Err(wrong(
+            &"base: there is neither a model nor a brdf_table to evaluate",
+        )),
+        Some(PackageBase::Model {
+            diffuse,
+            lobes,
+            color_table,
+        }) => {
             let (lobes, color_table) = (lobes.clone(), color_table.clone());
-            let base = CarPaint { coat, diffuse: *diffuse, lobes, color_table, flakes: None };
+            let base = CarPaint {
+                coat,
+                diffuse: *diffuse,
+                lobes,
+                color_table,
+                flakes: None,
+            };
             let reflectance = Reflectance::new(&base);
             let value = |&[wi, wo]: &[Direction; 2]| {
                 let terms = reflectance.terms(wi, wo, Chi::Table);
@@ -114,7 +159,9 @@ fn raw_package(package: &Package, pairs: &Pairs) -> Result<Vec<Option<[f64; 3]>>
                 if !(above(wi) && above(wo)) {
                     return None;
                 }
-                table.reflectance(refract(wi, ior), refract(wo, ior)).map(|base| through(wi, wo, base))
+                table
+                    .reflectance(refract(wi, ior), refract(wo, ior))
+                    .map(|base| through(wi, wo, base))
             };
             Ok(pairs.pairs.iter().map(value).collect())
         }

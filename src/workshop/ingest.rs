@@ -8,10 +8,12 @@ use super::{WorkshopError, read};
 use crate::accuracy::Profile;
 use crate::fit::{CoatChoice, FittedBase, fit_base, fit_flakes};
 use crate::measurement::{
-    BrdfMeasurement, HalfAngleTable, Layout, Package, PackageBase, ReadOptions, TableLayout, ThetaHSpacing, read_merl,
-    read_mpi,
+    BrdfMeasurement, HalfAngleTable, Layout, Package, PackageBase, ReadOptions, TableLayout,
+    ThetaHSpacing, read_merl, read_mpi,
 };
-use crate::paint::{CarPaint, Clustering, Coat, FitResiduals, Limits, PaintFile, Provenance, certify};
+use crate::paint::{
+    CarPaint, Clustering, Coat, FitResiduals, Limits, PaintFile, Provenance, certify,
+};
 
 /// How a measurement is ingested.
 #[derive(Clone, Debug, Default)]
@@ -32,9 +34,15 @@ pub struct IngestOptions {
 
 impl IngestOptions {
     /// Refuses a paint that was clustered otherwise than the caller asked for.
-    pub(super) fn check_clusters(&self, name: &str, paint: &PaintFile) -> Result<(), WorkshopError> {
+    pub(super) fn check_clusters(
+        &self,
+        name: &str,
+        paint: &PaintFile,
+    ) -> Result<(), WorkshopError> {
         match (self.clusters, &paint.clustering) {
-            (Some(wanted), Some(had)) if had.clusters != wanted && paint.provenance.source != "blend" => {
+            (Some(wanted), Some(had))
+                if had.clusters != wanted && paint.provenance.source != "blend" =>
+            {
                 let problem = format!(
                     "{name} was clustered with {} clusters a slice, {wanted} were asked for: ingest its measurement again \
                      with --clusters {wanted}, or leave the option out",
@@ -61,7 +69,10 @@ pub enum Measurement {
 /// # Errors
 ///
 /// [`WorkshopError`] naming the file, the file inside it, and what is wrong.
-pub fn open_measurement(path: &Path, options: &IngestOptions) -> Result<Measurement, WorkshopError> {
+pub fn open_measurement(
+    path: &Path,
+    options: &IngestOptions,
+) -> Result<Measurement, WorkshopError> {
     let wrong = |e: &dyn std::fmt::Display| WorkshopError::input(path.display(), e);
     let is_package = match options.read.layout {
         Some(layout) => layout == Layout::Package,
@@ -72,7 +83,8 @@ pub fn open_measurement(path: &Path, options: &IngestOptions) -> Result<Measurem
         return Ok(Measurement::Package(Box::new(package)));
     }
     let bytes = read(path, &options.limits)?;
-    let brdf = BrdfMeasurement::read(&bytes, &options.read, &options.limits).map_err(|e| wrong(&e))?;
+    let brdf =
+        BrdfMeasurement::read(&bytes, &options.read, &options.limits).map_err(|e| wrong(&e))?;
     Ok(Measurement::Brdf(Box::new(brdf), blake3::hash(&bytes)))
 }
 
@@ -88,10 +100,16 @@ pub fn ingest(
 ) -> Result<PaintFile, WorkshopError> {
     let name = match &options.name {
         Some(name) => name.clone(),
-        None => path.file_stem().map_or_else(|| "paint".to_owned(), |stem| stem.to_string_lossy().into_owned()),
+        None => path.file_stem().map_or_else(
+            || "paint".to_owned(),
+            |stem| stem.to_string_lossy().into_owned(),
+        ),
     };
     if !(1..=200).contains(&name.chars().count()) {
-        let problem = format!("the name has {} characters, accepted are 1 to 200", name.chars().count());
+        let problem = format!(
+            "the name has {} characters, accepted are 1 to 200",
+            name.chars().count()
+        );
         return Err(WorkshopError::usage("name", problem));
     }
     let file = match open_measurement(path, options)? {
@@ -99,7 +117,9 @@ pub fn ingest(
         Measurement::Package(package) => ingest_package(*package, options, progress),
     }
     .map_err(|problem| WorkshopError::input(path.display(), problem))?;
-    file.paint.validate(&options.limits).map_err(|problem| WorkshopError::input(path.display(), problem))?;
+    file.paint
+        .validate(&options.limits)
+        .map_err(|problem| WorkshopError::input(path.display(), problem))?;
     Ok(file)
 }
 
@@ -115,15 +135,17 @@ pub fn ingest_upload(
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<PaintFile, WorkshopError> {
     let named = |error: WorkshopError| WorkshopError {
-        message: error.message.replace(&path.display().to_string(), "the upload"),
+        message: error
+            .message
+            .replace(&path.display().to_string(), "the upload"),
         ..error
     };
     if !PaintFile::recognises(&first_bytes(path)?) {
         return ingest(path, options, progress).map_err(named);
     }
     let bytes = read(path, &options.limits).map_err(named)?;
-    let mut paint =
-        PaintFile::from_bytes(&bytes, &options.limits).map_err(|e| WorkshopError::input("the upload", e))?;
+    let mut paint = PaintFile::from_bytes(&bytes, &options.limits)
+        .map_err(|e| WorkshopError::input("the upload", e))?;
     options.check_clusters("the upload", &paint)?;
     if let Some(name) = &options.name {
         paint.name.clone_from(name);
@@ -137,7 +159,9 @@ fn ingest_brdf(
     name: String,
     options: &IngestOptions,
 ) -> Result<PaintFile, String> {
-    let coat = options.coat_ior.map_or(CoatChoice::ByResidual, CoatChoice::Ior);
+    let coat = options
+        .coat_ior
+        .map_or(CoatChoice::ByResidual, CoatChoice::Ior);
     let base = fit_base(brdf, coat).map_err(|e| e.to_string())?;
     let mut warnings = brdf.warnings();
     warnings.extend(base.warnings.iter().cloned());
@@ -151,10 +175,19 @@ fn ingest_brdf(
         ..Provenance::default()
     };
     if let Some(description) = brdf.description() {
-        provenance.notes.insert("description".to_owned(), description.to_owned());
+        provenance
+            .notes
+            .insert("description".to_owned(), description.to_owned());
     }
     let coat = base.coat;
-    Ok(finish(name, provenance, base_paint(&base, coat), Some(base.residuals), None, warnings))
+    Ok(finish(
+        name,
+        provenance,
+        base_paint(&base, coat),
+        Some(base.residuals),
+        None,
+        warnings,
+    ))
 }
 
 fn ingest_package(
@@ -166,7 +199,10 @@ fn ingest_package(
     let mut residuals = None;
     let coat = match (package.coat, options.coat_ior) {
         (coat, None) => coat,
-        (coat, Some(ior)) => Some(Coat { ior, ..coat.unwrap_or(Coat::smooth(ior)) }),
+        (coat, Some(ior)) => Some(Coat {
+            ior,
+            ..coat.unwrap_or(Coat::smooth(ior))
+        }),
     };
     let mut paint = match &package.base {
         None => {
@@ -174,9 +210,17 @@ fn ingest_package(
                         readings alone yet"
                 .to_owned());
         }
-        Some(PackageBase::Model { diffuse, lobes, color_table }) => {
-            CarPaint { coat, diffuse: *diffuse, lobes: lobes.clone(), color_table: color_table.clone(), flakes: None }
-        }
+        Some(PackageBase::Model {
+            diffuse,
+            lobes,
+            color_table,
+        }) => CarPaint {
+            coat,
+            diffuse: *diffuse,
+            lobes: lobes.clone(),
+            color_table: color_table.clone(),
+            flakes: None,
+        },
         Some(base @ PackageBase::Table { file, .. }) => {
             let table = table_of(base)?;
             let choice = CoatChoice::Inside(coat.map_or(1.0, |c| c.ior));
@@ -193,19 +237,32 @@ fn ingest_package(
             progress(done as f32 / of as f32);
             ControlFlow::Continue(())
         };
-        let fitted = fit_flakes(pictures, &options.profile.flakes, &tell).map_err(|e| e.to_string())?;
+        let fitted =
+            fit_flakes(pictures, &options.profile.flakes, &tell).map_err(|e| e.to_string())?;
         warnings.extend(fitted.warnings);
         clustering = Some(fitted.clustering);
         paint.flakes = Some(fitted.flakes);
     }
-    let provenance = Provenance { source: "package".to_owned(), notes: package.notes, ..Provenance::default() };
+    let provenance = Provenance {
+        source: "package".to_owned(),
+        notes: package.notes,
+        ..Provenance::default()
+    };
     let name = options.name.clone().unwrap_or(package.name);
-    Ok(finish(name, provenance, paint, residuals, clustering, warnings))
+    Ok(finish(
+        name, provenance, paint, residuals, clustering, warnings,
+    ))
 }
 
 /// The measured table of a package.
 pub(super) fn table_of(base: &PackageBase) -> Result<HalfAngleTable, String> {
-    let PackageBase::Table { file, bytes, layout, header_bytes } = base else {
+    let PackageBase::Table {
+        file,
+        bytes,
+        layout,
+        header_bytes,
+    } = base
+    else {
         return Err("the base is a model, not a table".to_owned());
     };
     match layout {
@@ -241,5 +298,13 @@ pub(super) fn finish(
             "the paint reflects up to {most:.2} times the light it gets: the measurement may be uncalibrated"
         ));
     }
-    PaintFile { name, provenance, paint, clustering, residuals, energy, warnings }
+    PaintFile {
+        name,
+        provenance,
+        paint,
+        clustering,
+        residuals,
+        energy,
+        warnings,
+    }
 }

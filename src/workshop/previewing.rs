@@ -76,7 +76,10 @@ pub fn preview(
     let shape: Shape = serde_json::from_value(json!(options.scene)).map_err(|_| {
         WorkshopError::usage(
             "scene",
-            format!("there is no scene '{}'; there are sphere, capsule and panel", options.scene),
+            format!(
+                "there is no scene '{}'; there are sphere, capsule and panel",
+                options.scene
+            ),
         )
     })?;
     let mut scene = Scene::new(shape, options.size);
@@ -93,7 +96,11 @@ pub fn preview(
     }
     .map_err(WorkshopError::internal)?;
     let report = json!({ "realisation": chosen.report, "rendering": rendering.report });
-    Ok(Made { bytes, report, notes: chosen.notes })
+    Ok(Made {
+        bytes,
+        report,
+        notes: chosen.notes,
+    })
 }
 
 fn refused(error: RenderError) -> WorkshopError {

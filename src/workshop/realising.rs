@@ -47,7 +47,10 @@ impl Format {
             Some("json") => Ok(Self::Json),
             Some("paint") => Ok(Self::Paint),
             _ => {
-                let problem = format!("{} ends in none of .zip, .glb, .json, .paint", path.display());
+                let problem = format!(
+                    "{} ends in none of .zip, .glb, .json, .paint",
+                    path.display()
+                );
                 Err(WorkshopError::usage("--out", problem))
             }
         }
@@ -65,7 +68,10 @@ pub(super) struct Chosen {
 }
 
 /// The paint itself, or the blend at the given weights.
-pub(super) fn choose(thing: &Thing, weights: Option<&RealisationWeights>) -> Result<Chosen, WorkshopError> {
+pub(super) fn choose(
+    thing: &Thing,
+    weights: Option<&RealisationWeights>,
+) -> Result<Chosen, WorkshopError> {
     match thing {
         Thing::Paint(file) => Ok(Chosen {
             name: file.name.clone(),
@@ -76,7 +82,8 @@ pub(super) fn choose(thing: &Thing, weights: Option<&RealisationWeights>) -> Res
             notes: Vec::new(),
         }),
         Thing::Blend(blend) => {
-            let weights = weights.ok_or_else(|| WorkshopError::usage("weights", "a blend needs weights"))?;
+            let weights =
+                weights.ok_or_else(|| WorkshopError::usage("weights", "a blend needs weights"))?;
             of_blend(blend, weights)
         }
     }
@@ -88,9 +95,17 @@ fn of_blend(blend: &Blend, weights: &RealisationWeights) -> Result<Chosen, Works
     let mut notes: Vec<String> = realised
         .clamps
         .iter()
-        .map(|c| format!("{}: {}, {} of {}, the worst by {:.4}", c.field, c.bound, c.count, c.of, c.worst))
+        .map(|c| {
+            format!(
+                "{}: {}, {} of {}, the worst by {:.4}",
+                c.field, c.bound, c.count, c.of, c.worst
+            )
+        })
         .collect();
-    for (what, sum) in ["base", "flake lightness", "flake color"].iter().zip(realised.weight_sums) {
+    for (what, sum) in ["base", "flake lightness", "flake color"]
+        .iter()
+        .zip(realised.weight_sums)
+    {
         if (sum - 1.0).abs() > 1e-6 {
             notes.push(format!("weights of {what} sum to {sum}, not 1"));
         }
@@ -108,7 +123,14 @@ fn of_blend(blend: &Blend, weights: &RealisationWeights) -> Result<Chosen, Works
         hashes: hashes.iter().map(|&h| h.to_owned()).collect(),
         ..Provenance::default()
     };
-    Ok(Chosen { name: names.join(" + "), provenance, paint: realised.paint, clamps: realised.clamps, report, notes })
+    Ok(Chosen {
+        name: names.join(" + "),
+        provenance,
+        paint: realised.paint,
+        clamps: realised.clamps,
+        report,
+        notes,
+    })
 }
 
 /// Writes a paint, or a blend at the given weights, as a file of the given format.
@@ -123,21 +145,36 @@ pub fn realise(
     profile: &Profile,
 ) -> Result<Made, WorkshopError> {
     if let (Format::Paint, Thing::Paint(file)) = (format, thing) {
-        return Ok(Made { bytes: file.to_bytes(), report: json!({ "paint": file.name }), notes: Vec::new() });
+        return Ok(Made {
+            bytes: file.to_bytes(),
+            report: json!({ "paint": file.name }),
+            notes: Vec::new(),
+        });
     }
     let chosen = choose(thing, weights)?;
-    let about =
-        About { name: chosen.name.clone(), provenance: chosen.provenance.clone(), report: chosen.report.clone() };
+    let about = About {
+        name: chosen.name.clone(),
+        provenance: chosen.provenance.clone(),
+        report: chosen.report.clone(),
+    };
     let bytes = match format {
         Format::Zip => export::bundle(&chosen.paint, &about, &profile.export),
         Format::Glb => export::glb(&chosen.paint, &about, &profile.export),
         Format::Json => export::material_json(&chosen.paint, &about, &profile.export),
         Format::Paint => {
-            return Ok(Made { bytes: paint_file(&chosen).to_bytes(), report: chosen.report, notes: chosen.notes });
+            return Ok(Made {
+                bytes: paint_file(&chosen).to_bytes(),
+                report: chosen.report,
+                notes: chosen.notes,
+            });
         }
     }
     .map_err(WorkshopError::internal)?;
-    Ok(Made { bytes, report: chosen.report, notes: chosen.notes })
+    Ok(Made {
+        bytes,
+        report: chosen.report,
+        notes: chosen.notes,
+    })
 }
 
 /// A realised paint as a paint of its own.
@@ -157,7 +194,12 @@ fn paint_file(chosen: &Chosen) -> PaintFile {
         warnings: chosen
             .clamps
             .iter()
-            .map(|c| format!("{}: {}, {} of {}, the worst by {:.4}", c.field, c.bound, c.count, c.of, c.worst))
+            .map(|c| {
+                format!(
+                    "{}: {}, {} of {}, the worst by {:.4}",
+                    c.field, c.bound, c.count, c.of, c.worst
+                )
+            })
             .collect(),
     }
 }

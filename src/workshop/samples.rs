@@ -46,37 +46,73 @@ pub const SAMPLES: [Sample; 8] = [
         name: "ford_f8",
         about: "dark metallic, simulated flakes: sparse and coarse",
         diffuse: [0.0012, 0.0015, 0.0018],
-        weights: [[0.0049, 0.0076, 0.012], [0.01, 0.013, 0.018], [0.007, 0.0065, 0.0077]],
+        weights: [
+            [0.0049, 0.0076, 0.012],
+            [0.01, 0.013, 0.018],
+            [0.007, 0.0065, 0.0077],
+        ],
         f0: [0.15, 0.087, 0.9],
         alpha: [0.32, 0.11, 0.013],
-        flakes: Some(Sparkle { per_mm2: 500.0, radius_um: 14.0, tilt: 0.15, seed: 0xf8 }),
+        flakes: Some(Sparkle {
+            per_mm2: 500.0,
+            radius_um: 14.0,
+            tilt: 0.15,
+            seed: 0xf8,
+        }),
     },
     Sample {
         name: "polaris_silber",
         about: "silver metallic, simulated flakes: dense and fine",
         diffuse: [0.055, 0.063, 0.071],
-        weights: [[0.065, 0.082, 0.088], [0.11, 0.11, 0.13], [0.008, 0.013, 0.015]],
+        weights: [
+            [0.065, 0.082, 0.088],
+            [0.11, 0.11, 0.13],
+            [0.008, 0.013, 0.015],
+        ],
         f0: [1.0, 0.92, 0.9],
         alpha: [0.38, 0.17, 0.013],
-        flakes: Some(Sparkle { per_mm2: 2400.0, radius_um: 11.0, tilt: 0.17, seed: 0x51 }),
+        flakes: Some(Sparkle {
+            per_mm2: 2400.0,
+            radius_um: 11.0,
+            tilt: 0.17,
+            seed: 0x51,
+        }),
     },
     Sample {
         name: "opel_titan",
         about: "titanium gray metallic, simulated flakes: medium",
         diffuse: [0.011, 0.013, 0.015],
-        weights: [[0.057, 0.066, 0.078], [0.11, 0.12, 0.13], [0.0095, 0.014, 0.016]],
+        weights: [
+            [0.057, 0.066, 0.078],
+            [0.11, 0.12, 0.13],
+            [0.0095, 0.014, 0.016],
+        ],
         f0: [0.85, 0.86, 0.9],
         alpha: [0.38, 0.17, 0.014],
-        flakes: Some(Sparkle { per_mm2: 1400.0, radius_um: 13.0, tilt: 0.17, seed: 0x71 }),
+        flakes: Some(Sparkle {
+            per_mm2: 1400.0,
+            radius_um: 13.0,
+            tilt: 0.17,
+            seed: 0x71,
+        }),
     },
     Sample {
         name: "bmw339",
         about: "gray metallic, simulated flakes: medium and fine",
         diffuse: [0.012, 0.015, 0.016],
-        weights: [[0.062, 0.076, 0.08], [0.11, 0.12, 0.12], [0.0083, 0.015, 0.016]],
+        weights: [
+            [0.062, 0.076, 0.08],
+            [0.11, 0.12, 0.12],
+            [0.0083, 0.015, 0.016],
+        ],
         f0: [0.92, 0.87, 0.9],
         alpha: [0.39, 0.17, 0.013],
-        flakes: Some(Sparkle { per_mm2: 1900.0, radius_um: 12.0, tilt: 0.17, seed: 0x339 }),
+        flakes: Some(Sparkle {
+            per_mm2: 1900.0,
+            radius_um: 12.0,
+            tilt: 0.17,
+            seed: 0x339,
+        }),
     },
     Sample {
         name: "2k_acrylack",
@@ -91,7 +127,11 @@ pub const SAMPLES: [Sample; 8] = [
         name: "white",
         about: "solid white, no flakes",
         diffuse: [0.61, 0.63, 0.55],
-        weights: [[2.6e-6, 0.00031, 3.1e-8], [0.013, 0.011, 0.0083], [0.049, 0.042, 0.037]],
+        weights: [
+            [2.6e-6, 0.00031, 3.1e-8],
+            [0.013, 0.011, 0.0083],
+            [0.049, 0.042, 0.037],
+        ],
         f0: [0.049, 0.45, 0.17],
         alpha: [1.0, 0.15, 0.015],
         flakes: None,
@@ -100,7 +140,11 @@ pub const SAMPLES: [Sample; 8] = [
         name: "blue",
         about: "solid blue, no flakes",
         diffuse: [0.0079, 0.023, 0.1],
-        weights: [[0.0011, 0.0015, 0.0019], [0.025, 0.03, 0.043], [0.059, 0.074, 0.082]],
+        weights: [
+            [0.0011, 0.0015, 0.0019],
+            [0.025, 0.03, 0.043],
+            [0.059, 0.074, 0.082],
+        ],
         f0: [1.0, 0.094, 0.17],
         alpha: [0.15, 0.043, 0.02],
         flakes: None,
@@ -109,7 +153,11 @@ pub const SAMPLES: [Sample; 8] = [
         name: "blue_matte",
         about: "solid blue without gloss, no flakes",
         diffuse: [0.0099, 0.036, 0.12],
-        weights: [[0.0032, 0.0045, 0.0059], [0.18, 0.23, 0.28], [0.04, 0.049, 0.051]],
+        weights: [
+            [0.0032, 0.0045, 0.0059],
+            [0.18, 0.23, 0.28],
+            [0.04, 0.049, 0.051],
+        ],
         f0: [1.0, 0.046, 0.17],
         alpha: [0.16, 0.075, 0.034],
         flakes: None,
@@ -132,8 +180,20 @@ impl Sample {
     /// The base as the paper fitted it, without flakes.
     #[must_use]
     pub fn base(&self) -> CarPaint {
-        let lobes = (0..3).map(|k| Lobe { weight: self.weights[k], alpha: self.alpha[k], f0: self.f0[k] }).collect();
-        CarPaint { coat: None, diffuse: self.diffuse, lobes, color_table: ColorTable::white(), flakes: None }
+        let lobes = (0..3)
+            .map(|k| Lobe {
+                weight: self.weights[k],
+                alpha: self.alpha[k],
+                f0: self.f0[k],
+            })
+            .collect();
+        CarPaint {
+            coat: None,
+            diffuse: self.diffuse,
+            lobes,
+            color_table: ColorTable::white(),
+            flakes: None,
+        }
     }
 }
 
@@ -143,10 +203,20 @@ impl Sample {
     /// # Errors
     ///
     /// [`WorkshopError`] when the profile's clusters are out of range.
-    pub fn build(&self, profile: &Profile, progress: &(dyn Fn(f32) + Sync)) -> Result<PaintFile, WorkshopError> {
+    pub fn build(
+        &self,
+        profile: &Profile,
+        progress: &(dyn Fn(f32) + Sync),
+    ) -> Result<PaintFile, WorkshopError> {
         let mut paint = self.base();
-        let mut provenance = Provenance { source: "sample".to_owned(), ..Provenance::default() };
-        provenance.notes.insert("base".to_owned(), "Günther et al., VMV 2005, table of fits".to_owned());
+        let mut provenance = Provenance {
+            source: "sample".to_owned(),
+            ..Provenance::default()
+        };
+        provenance.notes.insert(
+            "base".to_owned(),
+            "Günther et al., VMV 2005, table of fits".to_owned(),
+        );
         let (mut clustering, mut warnings) = (None, Vec::new());
         if let Some(sparkle) = self.flakes {
             let tell = |done: usize, of: usize| {
@@ -162,7 +232,14 @@ impl Sample {
             warnings.push("the flakes are simulated, not measured".to_owned());
             provenance.simulated_flakes = true;
         }
-        Ok(finish(self.name.to_owned(), provenance, paint, None, clustering, warnings))
+        Ok(finish(
+            self.name.to_owned(),
+            provenance,
+            paint,
+            None,
+            clustering,
+            warnings,
+        ))
     }
 }
 

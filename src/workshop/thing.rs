@@ -31,10 +31,19 @@ pub enum Thing {
 ///
 /// [`WorkshopError`] for a name that is neither, listing the samples.
 pub fn find(name: &str) -> Result<Source, WorkshopError> {
-    let known = || samples::SAMPLES.iter().map(|s| s.name).collect::<Vec<_>>().join(", ");
+    let known = || {
+        samples::SAMPLES
+            .iter()
+            .map(|s| s.name)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
     if let Some(sample) = name.strip_prefix("sample:") {
         return samples::by_name(sample).map(Source::Sample).ok_or_else(|| {
-            WorkshopError::input(name, format!("there is no sample '{sample}'; there are {}", known()))
+            WorkshopError::input(
+                name,
+                format!("there is no sample '{sample}'; there are {}", known()),
+            )
         });
     }
     let path = Path::new(name);
@@ -42,7 +51,13 @@ pub fn find(name: &str) -> Result<Source, WorkshopError> {
         return Ok(Source::Path(path.to_owned()));
     }
     samples::by_name(name).map(Source::Sample).ok_or_else(|| {
-        WorkshopError::input(name, format!("no such file, and no sample of this name; samples are {}", known()))
+        WorkshopError::input(
+            name,
+            format!(
+                "no such file, and no sample of this name; samples are {}",
+                known()
+            ),
+        )
     })
 }
 
@@ -52,7 +67,8 @@ pub fn find(name: &str) -> Result<Source, WorkshopError> {
 ///
 /// [`WorkshopError`] when the file cannot be read or is larger than `limits.bytes`.
 pub fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, WorkshopError> {
-    let fail = |e: std::io::Error| WorkshopError::input(path.display(), format!("cannot be read: {e}"));
+    let fail =
+        |e: std::io::Error| WorkshopError::input(path.display(), format!("cannot be read: {e}"));
     let length = std::fs::metadata(path).map_err(fail)?.len();
     if length > limits.bytes {
         let problem = format!("{length} bytes, accepted are up to {}", limits.bytes);
@@ -67,9 +83,14 @@ pub(super) fn first_bytes(path: &Path) -> Result<Vec<u8>, WorkshopError> {
     if path.is_dir() {
         return Ok(Vec::new());
     }
-    let fail = |e: std::io::Error| WorkshopError::input(path.display(), format!("cannot be read: {e}"));
+    let fail =
+        |e: std::io::Error| WorkshopError::input(path.display(), format!("cannot be read: {e}"));
     let mut head = Vec::new();
-    std::fs::File::open(path).map_err(fail)?.take(16).read_to_end(&mut head).map_err(fail)?;
+    std::fs::File::open(path)
+        .map_err(fail)?
+        .take(16)
+        .read_to_end(&mut head)
+        .map_err(fail)?;
     Ok(head)
 }
 
@@ -86,7 +107,8 @@ pub fn open_paint(
     match open(name, options, progress)? {
         Thing::Paint(paint) => Ok(*paint),
         Thing::Blend(_) => {
-            let problem = "this is a blend; realise it to a .paint first, which can be blended again";
+            let problem =
+                "this is a blend; realise it to a .paint first, which can be blended again";
             Err(WorkshopError::input(name, problem))
         }
     }
@@ -97,20 +119,30 @@ pub fn open_paint(
 /// # Errors
 ///
 /// [`WorkshopError`] for a name that is nothing or a damaged file.
-pub fn open(name: &str, options: &IngestOptions, progress: &(dyn Fn(f32) + Sync)) -> Result<Thing, WorkshopError> {
+pub fn open(
+    name: &str,
+    options: &IngestOptions,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Thing, WorkshopError> {
     let path = match find(name)? {
-        Source::Sample(sample) => return Ok(Thing::Paint(Box::new(sample.build(&options.profile, progress)?))),
+        Source::Sample(sample) => {
+            return Ok(Thing::Paint(Box::new(
+                sample.build(&options.profile, progress)?,
+            )));
+        }
         Source::Path(path) => path,
     };
     let head = first_bytes(&path)?;
     if Blend::recognises(&head) {
         let bytes = read(&path, &options.limits)?;
-        let blend = Blend::from_bytes(&bytes, &options.limits).map_err(|e| WorkshopError::input(name, e))?;
+        let blend = Blend::from_bytes(&bytes, &options.limits)
+            .map_err(|e| WorkshopError::input(name, e))?;
         return Ok(Thing::Blend(Box::new(blend)));
     }
     if PaintFile::recognises(&head) {
         let bytes = read(&path, &options.limits)?;
-        let paint = PaintFile::from_bytes(&bytes, &options.limits).map_err(|e| WorkshopError::input(name, e))?;
+        let paint = PaintFile::from_bytes(&bytes, &options.limits)
+            .map_err(|e| WorkshopError::input(name, e))?;
         options.check_clusters(name, &paint)?;
         return Ok(Thing::Paint(Box::new(paint)));
     }
@@ -128,7 +160,11 @@ impl Thing {
         weights: impl FnOnce(&Blend) -> Result<Option<RealisationWeights>, WorkshopError>,
     ) -> Result<Realised<CarPaint>, WorkshopError> {
         match self {
-            Self::Paint(file) => Ok(Realised { paint: file.paint, clamps: Vec::new(), weight_sums: [1.0; 3] }),
+            Self::Paint(file) => Ok(Realised {
+                paint: file.paint,
+                clamps: Vec::new(),
+                weight_sums: [1.0; 3],
+            }),
             Self::Blend(blend) => match weights(&blend)? {
                 Some(weights) => Ok(blend.realise(&weights)?),
                 None => Err(WorkshopError::internal("a blend without weights")),

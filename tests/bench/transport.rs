@@ -35,7 +35,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut plan = Plan::default();
     let mut solved = Vec::with_capacity(index.n);
     for k in 0..index.n {
-        let (Some(&ns), Some(&nt), Some(&offset)) = (index.ns.get(k), index.nt.get(k), index.offset.get(k)) else {
+        let (Some(&ns), Some(&nt), Some(&offset)) =
+            (index.ns.get(k), index.nt.get(k), index.offset.get(k))
+        else {
             return Err(format!("slices.json lists no problem {k}").into());
         };
         let values = bytes
@@ -55,7 +57,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         TransportSimplex.solve_into(&problem, Cost::Distance, &mut workspace, &mut plan)?;
         let microseconds = begin.elapsed().as_secs_f64() * 1e6;
 
-        solved.push(Solved { cost: plan.cost, microseconds });
+        solved.push(Solved {
+            cost: plan.cost,
+            microseconds,
+        });
     }
     let mut out = std::io::stdout().lock();
     serde_json::to_writer(&mut out, &solved)?;

@@ -8,8 +8,8 @@ use std::path::Path;
 use carpaint::color::Lab;
 use carpaint::export::{About, ExportSettings, Precision, bundle, glb, material_json};
 use carpaint::paint::{
-    AngleGrid, CarPaint, Chi, Coat, ColorTable, Direction, FlakeSampler, FlakeTexture, Flakes, Lobe, Provenance,
-    RandomTexture, Reflectance, half_angles, refract,
+    AngleGrid, CarPaint, Chi, Coat, ColorTable, Direction, FlakeSampler, FlakeTexture, Flakes,
+    Lobe, Provenance, RandomTexture, Reflectance, half_angles, refract,
 };
 use serde_json::{Value, json};
 
@@ -19,20 +19,46 @@ fn main() -> Result<(), Anything> {
     let folder = std::env::args().nth(1).ok_or("name a folder to write to")?;
     let folder = Path::new(&folder);
     std::fs::create_dir_all(folder)?;
-    for (name, paint) in [("silver", silver()?), ("travel", travelling()?), ("solid", solid()?)] {
+    for (name, paint) in [
+        ("silver", silver()?),
+        ("travel", travelling()?),
+        ("solid", solid()?),
+    ] {
         let about = About {
             name: name.into(),
-            provenance: Provenance { source: "made up".into(), ..Provenance::default() },
+            provenance: Provenance {
+                source: "made up".into(),
+                ..Provenance::default()
+            },
             report: json!({"warnings": []}),
         };
-        for (suffix, precision) in [("f32", Precision::F32), ("f16", Precision::F16), ("8bit", Precision::Eight)] {
-            let settings = ExportSettings { precision, ..ExportSettings::default() };
-            std::fs::write(folder.join(format!("{name}_{suffix}.zip")), bundle(&paint, &about, &settings)?)?;
+        for (suffix, precision) in [
+            ("f32", Precision::F32),
+            ("f16", Precision::F16),
+            ("8bit", Precision::Eight),
+        ] {
+            let settings = ExportSettings {
+                precision,
+                ..ExportSettings::default()
+            };
+            std::fs::write(
+                folder.join(format!("{name}_{suffix}.zip")),
+                bundle(&paint, &about, &settings)?,
+            )?;
         }
         let settings = ExportSettings::default();
-        std::fs::write(folder.join(format!("{name}.json")), material_json(&paint, &about, &settings)?)?;
-        std::fs::write(folder.join(format!("{name}.glb")), glb(&paint, &about, &settings)?)?;
-        std::fs::write(folder.join(format!("{name}_expected.json")), serde_json::to_vec(&expected(&paint))?)?;
+        std::fs::write(
+            folder.join(format!("{name}.json")),
+            material_json(&paint, &about, &settings)?,
+        )?;
+        std::fs::write(
+            folder.join(format!("{name}.glb")),
+            glb(&paint, &about, &settings)?,
+        )?;
+        std::fs::write(
+            folder.join(format!("{name}_expected.json")),
+            serde_json::to_vec(&expected(&paint))?,
+        )?;
     }
     Ok(())
 }
@@ -45,21 +71,38 @@ fn expected(paint: &CarPaint) -> Value {
         .map(|k| {
             // Half of the pairs near the mirror direction, where paint changes fastest.
             let wi = random.direction();
-            let wo = if k % 2 == 0 { random.direction() } else { random.near([-wi[0], -wi[1], wi[2]]) };
-            let (f, mirror) = (reflectance.evaluate(wi, wo, Chi::Table), reflectance.mirror(wo));
-            let mean = reflectance.terms(wi, wo, Chi::Table).map_or([0.0; 3], |terms| terms.flakes);
+            let wo = if k % 2 == 0 {
+                random.direction()
+            } else {
+                random.near([-wi[0], -wi[1], wi[2]])
+            };
+            let (f, mirror) = (
+                reflectance.evaluate(wi, wo, Chi::Table),
+                reflectance.mirror(wo),
+            );
+            let mean = reflectance
+                .terms(wi, wo, Chi::Table)
+                .map_or([0.0; 3], |terms| terms.flakes);
             json!({"wi": wi, "wo": wo, "f": f, "mirror": mirror, "flakes": mean})
         })
         .collect();
-    let Some(flakes) = &paint.flakes else { return json!({"pairs": pairs, "slices": [], "texels": []}) };
+    let Some(flakes) = &paint.flakes else {
+        return json!({"pairs": pairs, "slices": [], "texels": []});
+    };
     let columns = flakes.theta_d.len();
     let slices: Vec<Value> = (0..flakes.slices())
         .map(|k| {
-            let angles = [flakes.theta_h.degrees()[k / columns], flakes.theta_d.degrees()[k % columns]];
+            let angles = [
+                flakes.theta_h.degrees()[k / columns],
+                flakes.theta_d.degrees()[k % columns],
+            ];
             json!({"angles": angles, "mean": flakes.slice_at(k).mean()})
         })
         .collect();
-    let (sampler, tile) = (FlakeSampler::new(flakes), RandomTexture::of(&flakes.texture));
+    let (sampler, tile) = (
+        FlakeSampler::new(flakes),
+        RandomTexture::of(&flakes.texture),
+    );
     let texels: Vec<Value> = (0..400)
         .map(|_| {
             let (x, y) = (random.within(-900, 900), random.within(-900, 900));
@@ -81,7 +124,11 @@ fn solid() -> Result<CarPaint, Anything> {
     Ok(CarPaint {
         coat: None,
         diffuse: [0.4, 0.05, 0.03],
-        lobes: vec![Lobe { weight: [0.02, 0.021, 0.022], alpha: 0.06, f0: 0.3 }],
+        lobes: vec![Lobe {
+            weight: [0.02, 0.021, 0.022],
+            alpha: 0.06,
+            f0: 0.3,
+        }],
         color_table: ColorTable::white(),
         flakes: None,
     })
@@ -97,10 +144,18 @@ fn silver() -> Result<CarPaint, Anything> {
         .map(|k| {
             #[allow(clippy::cast_precision_loss)]
             let t = k as f64;
-            Lab { l: 95.0 - t, a: 3.0 * (t / 5.0).sin(), b: t / 3.0 - 4.0 }
+            Lab {
+                l: 95.0 - t,
+                a: 3.0 * (t / 5.0).sin(),
+                b: t / 3.0 - 4.0,
+            }
         })
         .collect();
-    let overall = Lab { l: 80.0, a: 0.0, b: 2.0 };
+    let overall = Lab {
+        l: 80.0,
+        a: 0.0,
+        b: 2.0,
+    };
     let color_table = ColorTable::new(theta_h.clone(), theta_d.clone(), nodes, overall)?;
     let mut flakes = Flakes {
         theta_h,
@@ -122,26 +177,51 @@ fn silver() -> Result<CarPaint, Anything> {
         let (row, count) = ((k / flakes.theta_d.len()) as f64, 20 + k % 31);
         let weights: Vec<f64> = (0..count).map(|_| 0.01 + random.unit().powi(6)).collect();
         let sum: f64 = weights.iter().sum();
-        let mut lightness: Vec<f64> = (0..count).map(|_| (140.0 - 12.0 * row) * random.unit().powi(3) - 3.0).collect();
+        let mut lightness: Vec<f64> = (0..count)
+            .map(|_| (140.0 - 12.0 * row) * random.unit().powi(3) - 3.0)
+            .collect();
         lightness.sort_by(f64::total_cmp);
         for (weight, l) in weights.iter().zip(lightness) {
             let tint = [40.0 * (random.unit() - 0.5), 40.0 * (random.unit() - 0.5)];
             #[allow(clippy::cast_possible_truncation)]
             let center = [l, tint[0], tint[1]].map(|v| v as f32);
             #[allow(clippy::cast_possible_truncation)]
-            let half = [5.0 * random.unit(), 4.0 * random.unit(), 4.0 * random.unit()].map(|v| v as f32);
+            let half = [
+                5.0 * random.unit(),
+                4.0 * random.unit(),
+                4.0 * random.unit(),
+            ]
+            .map(|v| v as f32);
             flakes.probability.push(weight / sum);
-            flakes.lower.push(std::array::from_fn(|axis| center[axis] - half[axis]));
-            flakes.upper.push(std::array::from_fn(|axis| center[axis] + half[axis]));
+            flakes
+                .lower
+                .push(std::array::from_fn(|axis| center[axis] - half[axis]));
+            flakes
+                .upper
+                .push(std::array::from_fn(|axis| center[axis] + half[axis]));
         }
-        flakes.offsets.push(u32::try_from(flakes.probability.len())?);
+        flakes
+            .offsets
+            .push(u32::try_from(flakes.probability.len())?);
     }
     checked(CarPaint {
-        coat: Some(Coat { ior: 1.5, roughness: 0.02, thickness_um: None }),
+        coat: Some(Coat {
+            ior: 1.5,
+            roughness: 0.02,
+            thickness_um: None,
+        }),
         diffuse: [0.05, 0.055, 0.06],
         lobes: vec![
-            Lobe { weight: [0.06, 0.065, 0.07], alpha: 0.35, f0: 0.8 },
-            Lobe { weight: [0.05, 0.05, 0.05], alpha: 0.12, f0: 0.5 },
+            Lobe {
+                weight: [0.06, 0.065, 0.07],
+                alpha: 0.35,
+                f0: 0.8,
+            },
+            Lobe {
+                weight: [0.05, 0.05, 0.05],
+                alpha: 0.12,
+                f0: 0.5,
+            },
         ],
         color_table,
         flakes: Some(flakes),

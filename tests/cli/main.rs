@@ -11,7 +11,9 @@ struct Desk {
 
 impl Desk {
     fn new() -> Self {
-        Self { folder: tempfile::tempdir().expect("a temporary folder") }
+        Self {
+            folder: tempfile::tempdir().expect("a temporary folder"),
+        }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -28,7 +30,11 @@ impl Desk {
 
     fn ok(&self, words: &[&str]) -> Output {
         let output = self.run(words);
-        assert!(output.status.success(), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{words:?}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         output
     }
 
@@ -37,7 +43,10 @@ impl Desk {
         let output = self.run(words);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(code), "{words:?}: {said}");
-        assert!(!said.trim().is_empty() && !said.contains("panicked"), "{words:?}: {said}");
+        assert!(
+            !said.trim().is_empty() && !said.contains("panicked"),
+            "{words:?}: {said}"
+        );
         said
     }
 
@@ -58,7 +67,15 @@ impl Desk {
     /// A blend of a metallic and a solid sample, with few clusters so that it is quick.
     fn with_blend() -> Self {
         let desk = Self::new();
-        desk.ok(&["blend", "sample:bmw339", "sample:blue", "--profile", "draft", "--out", "b.blend"]);
+        desk.ok(&[
+            "blend",
+            "sample:bmw339",
+            "sample:blue",
+            "--profile",
+            "draft",
+            "--out",
+            "b.blend",
+        ]);
         desk
     }
 }
@@ -76,7 +93,10 @@ fn samples_are_listed_and_exported() {
     let about = json(&desk.ok(&["show", "white.paint", "--json"]).stdout);
     assert_eq!(about["name"], "white");
     assert!(about["flakes"].is_null() && about["energy"]["albedo"][0].is_number());
-    assert!(desk.refused(3, &["samples", "export", "pink", "--out", "p.paint"]).contains("polaris_silber"));
+    assert!(
+        desk.refused(3, &["samples", "export", "pink", "--out", "p.paint"])
+            .contains("polaris_silber")
+    );
     assert_eq!(desk.files(), ["white.paint"]);
 }
 
@@ -86,13 +106,38 @@ fn a_blend_is_realised_as_everything_the_same_on_any_number_of_threads() {
     for name in ["r.zip", "r.glb", "r.json", "r.paint"] {
         let mut seen = Vec::new();
         for threads in ["1", "2", "8"] {
-            desk.ok(&["realise", "b.blend", "--weights", "0.3,0.7", "--threads", threads, "--out", name]);
+            desk.ok(&[
+                "realise",
+                "b.blend",
+                "--weights",
+                "0.3,0.7",
+                "--threads",
+                threads,
+                "--out",
+                name,
+            ]);
             seen.push(desk.read(name));
         }
-        assert!(seen[0].len() > 500 && seen.windows(2).all(|w| w[0] == w[1]), "{name} differs");
+        assert!(
+            seen[0].len() > 500 && seen.windows(2).all(|w| w[0] == w[1]),
+            "{name} differs"
+        );
     }
-    assert_eq!(json(&desk.read("r.json"))["format"].as_str().map(|f| f.starts_with("carpaint")), Some(true));
-    desk.ok(&["blend", "r.paint", "sample:white", "--profile", "draft", "--out", "again.blend"]);
+    assert_eq!(
+        json(&desk.read("r.json"))["format"]
+            .as_str()
+            .map(|f| f.starts_with("carpaint")),
+        Some(true)
+    );
+    desk.ok(&[
+        "blend",
+        "r.paint",
+        "sample:white",
+        "--profile",
+        "draft",
+        "--out",
+        "again.blend",
+    ]);
 }
 
 #[test]
@@ -101,27 +146,98 @@ fn weights_are_asked_for_and_checked() {
     let out = ["--out", "x.json"];
     let with = |words: &[&'static str]| [&["realise", "b.blend"], words, &out].concat();
     let said = desk.refused(2, &with(&[]));
-    assert!(said.contains("2 numbers") && said.contains("bmw339, blue"), "{said}");
+    assert!(
+        said.contains("2 numbers") && said.contains("bmw339, blue"),
+        "{said}"
+    );
     for weights in ["nan,1", "inf,0", "1", "a,b", "1,2,3", ""] {
-        desk.refused(2, &["realise", "b.blend", "--weights", weights, "--out", "x.json"]);
+        desk.refused(
+            2,
+            &[
+                "realise",
+                "b.blend",
+                "--weights",
+                weights,
+                "--out",
+                "x.json",
+            ],
+        );
     }
     assert_eq!(desk.files(), ["b.blend"]);
     for weights in ["-2,3", "0,0", "1e6,-1e6"] {
-        desk.ok(&["realise", "b.blend", "--weights", weights, "--out", "x.json"]);
+        desk.ok(&[
+            "realise",
+            "b.blend",
+            "--weights",
+            weights,
+            "--out",
+            "x.json",
+        ]);
     }
-    desk.refused(2, &["preview", "sample:white", "--weights", "1,0", "--out", "x.png"]);
+    desk.refused(
+        2,
+        &[
+            "preview",
+            "sample:white",
+            "--weights",
+            "1,0",
+            "--out",
+            "x.png",
+        ],
+    );
 }
 
 #[test]
 fn previews_are_drawn_in_the_size_asked_for() {
     let desk = Desk::with_blend();
-    desk.ok(&["preview", "b.blend", "--weights", "0.5,0.5", "--size", "40x30", "--spp", "2", "--out", "p.png"]);
+    desk.ok(&[
+        "preview",
+        "b.blend",
+        "--weights",
+        "0.5,0.5",
+        "--size",
+        "40x30",
+        "--spp",
+        "2",
+        "--out",
+        "p.png",
+    ]);
     let png = desk.read("p.png");
-    assert_eq!((&png[..4], &png[16..24]), (&b"\x89PNG"[..], &[0, 0, 0, 40, 0, 0, 0, 30][..]));
-    desk.ok(&["preview", "sample:white", "--scene", "panel", "--size", "16x16", "--spp", "1", "--out", "p.exr"]);
+    assert_eq!(
+        (&png[..4], &png[16..24]),
+        (&b"\x89PNG"[..], &[0, 0, 0, 40, 0, 0, 0, 30][..])
+    );
+    desk.ok(&[
+        "preview",
+        "sample:white",
+        "--scene",
+        "panel",
+        "--size",
+        "16x16",
+        "--spp",
+        "1",
+        "--out",
+        "p.exr",
+    ]);
     assert_eq!(desk.read("p.exr")[..4], [0x76, 0x2f, 0x31, 0x01]);
-    assert!(desk.refused(2, &["preview", "sample:white", "--scene", "cube", "--out", "p.png"]).contains("capsule"));
-    desk.refused(2, &["preview", "sample:white", "--size", "0x5", "--out", "p.png"]);
+    assert!(
+        desk.refused(
+            2,
+            &[
+                "preview",
+                "sample:white",
+                "--scene",
+                "cube",
+                "--out",
+                "p.png"
+            ]
+        )
+        .contains("capsule")
+    );
+    desk.refused(
+        2,
+        &["preview", "sample:white", "--size", "0x5", "--out", "p.png"],
+    );
     desk.refused(2, &["preview", "sample:white", "--out", "p.gif"]);
 }
 
@@ -133,30 +249,87 @@ fn evaluation_reads_pairs_and_writes_values() {
         r#"{"pairs": [[[0,0,1],[0,0,1]], [[0.6,0,0.8],[0,0.6,0.8]], [[0.6,0,0.8],[0,0.6,-0.8]]]}"#,
     )
     .expect("written");
-    desk.ok(&["evaluate", "sample:white", "--directions", "d.json", "--out", "v.json"]);
+    desk.ok(&[
+        "evaluate",
+        "sample:white",
+        "--directions",
+        "d.json",
+        "--out",
+        "v.json",
+    ]);
     let values = json(&desk.read("v.json"));
     assert_eq!(values["f"].as_array().map(Vec::len), Some(3));
-    assert!(values["f"][1][0].as_f64().is_some_and(|v| v > 0.61 / std::f64::consts::PI));
+    assert!(
+        values["f"][1][0]
+            .as_f64()
+            .is_some_and(|v| v > 0.61 / std::f64::consts::PI)
+    );
     assert_eq!(values["f"][2], serde_json::json!([0.0, 0.0, 0.0]));
     for bad in ["{", r#"{"pairs": [[[0,0,2],[0,0,1]]]}"#, r#"{"pears": []}"#] {
         fs::write(desk.path("bad.json"), bad).expect("written");
         assert!(
-            desk.refused(3, &["evaluate", "sample:white", "--directions", "bad.json", "--out", "w.json"])
-                .contains("bad.json")
+            desk.refused(
+                3,
+                &[
+                    "evaluate",
+                    "sample:white",
+                    "--directions",
+                    "bad.json",
+                    "--out",
+                    "w.json"
+                ]
+            )
+            .contains("bad.json")
         );
     }
-    let said = desk.refused(3, &["evaluate", "sample:white", "--raw", "--directions", "d.json", "--out", "w.json"]);
+    let said = desk.refused(
+        3,
+        &[
+            "evaluate",
+            "sample:white",
+            "--raw",
+            "--directions",
+            "d.json",
+            "--out",
+            "w.json",
+        ],
+    );
     assert!(said.contains("no measurement"), "{said}");
 }
 
 #[test]
 fn texels_are_flakes_at_one_angle_pair() {
     let desk = Desk::with_blend();
-    let words = ["texels", "b.blend", "--weights", "1,0", "--theta-h", "3", "--theta-d", "10", "--size", "32x16"];
+    let words = [
+        "texels",
+        "b.blend",
+        "--weights",
+        "1,0",
+        "--theta-h",
+        "3",
+        "--theta-d",
+        "10",
+        "--size",
+        "32x16",
+    ];
     desk.ok(&[&words[..], &["--seed", "4", "--out", "t.exr"]].concat());
     desk.ok(&[&words[..], &["--seed", "5", "--out", "u.exr"]].concat());
     assert_ne!(desk.read("t.exr"), desk.read("u.exr"));
-    desk.refused(2, &["texels", "b.blend", "--weights", "1,0", "--theta-h", "95", "--theta-d", "0", "--out", "t.exr"]);
+    desk.refused(
+        2,
+        &[
+            "texels",
+            "b.blend",
+            "--weights",
+            "1,0",
+            "--theta-h",
+            "95",
+            "--theta-d",
+            "0",
+            "--out",
+            "t.exr",
+        ],
+    );
 }
 
 #[test]
@@ -164,30 +337,90 @@ fn mistakes_are_told_with_their_own_exit_codes() {
     let desk = Desk::new();
     desk.refused(2, &["frobnicate"]);
     desk.refused(2, &["blend", "sample:white", "--out", "b.blend"]);
-    desk.refused(2, &["blend", "sample:white", "sample:blue", "--threads", "0", "--out", "b.blend"]);
-    desk.refused(2, &["blend", "sample:white", "sample:blue", "--profile", "best", "--out", "b.blend"]);
+    desk.refused(
+        2,
+        &[
+            "blend",
+            "sample:white",
+            "sample:blue",
+            "--threads",
+            "0",
+            "--out",
+            "b.blend",
+        ],
+    );
+    desk.refused(
+        2,
+        &[
+            "blend",
+            "sample:white",
+            "sample:blue",
+            "--profile",
+            "best",
+            "--out",
+            "b.blend",
+        ],
+    );
     desk.refused(3, &["show", "nothing-here"]);
-    desk.refused(4, &["samples", "export", "white", "--out", "no/such/folder/w.paint"]);
+    desk.refused(
+        4,
+        &[
+            "samples",
+            "export",
+            "white",
+            "--out",
+            "no/such/folder/w.paint",
+        ],
+    );
     fs::write(desk.path("white"), b"not a paint").expect("written");
-    assert!(desk.refused(3, &["show", "white"]).contains("white"), "an existing path wins over a sample's name");
+    assert!(
+        desk.refused(3, &["show", "white"]).contains("white"),
+        "an existing path wins over a sample's name"
+    );
     desk.ok(&["show", "sample:white"]);
     desk.ok(&["samples", "export", "white", "--out", "w.paint"]);
     let mut bytes = desk.read("w.paint");
     bytes[16] = 9;
     fs::write(desk.path("newer.paint"), &bytes).expect("written");
-    assert!(desk.refused(3, &["show", "newer.paint"]).contains("version 9"));
+    assert!(
+        desk.refused(3, &["show", "newer.paint"])
+            .contains("version 9")
+    );
     bytes.truncate(200);
     fs::write(desk.path("cut.paint"), &bytes).expect("written");
     desk.refused(3, &["show", "cut.paint"]);
-    assert_eq!(desk.files(), ["cut.paint", "newer.paint", "w.paint", "white"], "nothing half-written is left");
+    assert_eq!(
+        desk.files(),
+        ["cut.paint", "newer.paint", "w.paint", "white"],
+        "nothing half-written is left"
+    );
 }
 
 #[test]
 fn clusters_other_than_a_paint_has_are_refused() {
     let desk = Desk::new();
-    desk.ok(&["samples", "export", "bmw339", "--clusters", "12", "--out", "p.paint"]);
+    desk.ok(&[
+        "samples",
+        "export",
+        "bmw339",
+        "--clusters",
+        "12",
+        "--out",
+        "p.paint",
+    ]);
     desk.ok(&["show", "p.paint"]);
-    let said = desk.refused(2, &["blend", "p.paint", "sample:blue", "--clusters", "30", "--out", "b.blend"]);
+    let said = desk.refused(
+        2,
+        &[
+            "blend",
+            "p.paint",
+            "sample:blue",
+            "--clusters",
+            "30",
+            "--out",
+            "b.blend",
+        ],
+    );
     assert!(said.contains("12") && said.contains("30"), "{said}");
     assert!(!Path::new(&desk.path("b.blend")).exists());
 }
@@ -195,8 +428,13 @@ fn clusters_other_than_a_paint_has_are_refused() {
 #[test]
 fn every_command_teaches_itself() {
     let desk = Desk::new();
-    for command in ["serve", "ingest", "show", "blend", "realise", "preview", "texels", "evaluate", "samples"] {
+    for command in [
+        "serve", "ingest", "show", "blend", "realise", "preview", "texels", "evaluate", "samples",
+    ] {
         let help = String::from_utf8(desk.ok(&[command, "--help"]).stdout).expect("text");
-        assert!(help.contains("Usage: carpaint") && help.len() > 300, "{command}: {help}");
+        assert!(
+            help.contains("Usage: carpaint") && help.len() > 300,
+            "{command}: {help}"
+        );
     }
 }

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
-    Accuracy, App, Fault, Format, IngestOrder, PictureFormat, Progress, ServiceConfig, Thing, View, WorkError, Works,
-    open, serve,
+    Accuracy, App, Fault, Format, IngestOrder, PictureFormat, Progress, ServiceConfig, Thing, View,
+    WorkError, Works, open, serve,
 };
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
@@ -23,15 +23,28 @@ use crate::client::{Answer, ask};
 pub struct Pretend;
 
 fn refuse(fault: Fault, message: impl Into<String>) -> WorkError {
-    WorkError { fault, field: None, message: message.into() }
+    WorkError {
+        fault,
+        field: None,
+        message: message.into(),
+    }
 }
 
 impl Works for Pretend {
-    fn ingest(&self, upload: &Path, order: &IngestOrder, progress: Progress<'_>) -> Result<PaintFile, WorkError> {
-        let bytes = std::fs::read(upload).map_err(|error| refuse(Fault::Internal, error.to_string()))?;
+    fn ingest(
+        &self,
+        upload: &Path,
+        order: &IngestOrder,
+        progress: Progress<'_>,
+    ) -> Result<PaintFile, WorkError> {
+        let bytes =
+            std::fs::read(upload).map_err(|error| refuse(Fault::Internal, error.to_string()))?;
         let words = String::from_utf8_lossy(&bytes);
         if words.starts_with("not") {
-            return Err(refuse(Fault::Upload, format!("{}: this is no measurement", upload.display())));
+            return Err(refuse(
+                Fault::Upload,
+                format!("{}: this is no measurement", upload.display()),
+            ));
         }
         assert!(!words.starts_with("panic"), "told to");
         if words.starts_with("slow") {
@@ -42,12 +55,24 @@ impl Works for Pretend {
             }
         }
         let seed = f64::from(blake3::hash(&bytes).as_bytes()[0]) / 256.0;
-        let lobes = vec![Lobe { weight: [0.1; 3], alpha: 0.1 + seed, f0: 0.5 }];
-        let paint =
-            CarPaint { coat: None, diffuse: [seed, 0.2, 0.3], lobes, color_table: ColorTable::white(), flakes: None };
+        let lobes = vec![Lobe {
+            weight: [0.1; 3],
+            alpha: 0.1 + seed,
+            f0: 0.5,
+        }];
+        let paint = CarPaint {
+            coat: None,
+            diffuse: [seed, 0.2, 0.3],
+            lobes,
+            color_table: ColorTable::white(),
+            flakes: None,
+        };
         Ok(PaintFile {
             name: order.name.clone().unwrap_or_else(|| "unnamed".to_owned()),
-            provenance: Provenance { source: "package".to_owned(), ..Provenance::default() },
+            provenance: Provenance {
+                source: "package".to_owned(),
+                ..Provenance::default()
+            },
             energy: certify(&paint),
             paint,
             clustering: None,
@@ -56,11 +81,22 @@ impl Works for Pretend {
         })
     }
 
-    fn blend(&self, paints: &[&PaintFile], _: Accuracy, progress: Progress<'_>) -> Result<Blend, WorkError> {
+    fn blend(
+        &self,
+        paints: &[&PaintFile],
+        _: Accuracy,
+        progress: Progress<'_>,
+    ) -> Result<Blend, WorkError> {
         std::thread::sleep(Duration::from_millis(100));
-        let ingredients: Vec<Ingredient<'_>> =
-            paints.iter().map(|file| Ingredient { name: &file.name, paint: &file.paint }).collect();
-        Blend::new(&ingredients, &BlendSettings::default(), progress).map_err(|e| refuse(Fault::Request, e.to_string()))
+        let ingredients: Vec<Ingredient<'_>> = paints
+            .iter()
+            .map(|file| Ingredient {
+                name: &file.name,
+                paint: &file.paint,
+            })
+            .collect();
+        Blend::new(&ingredients, &BlendSettings::default(), progress)
+            .map_err(|e| refuse(Fault::Request, e.to_string()))
     }
 
     fn realise(
@@ -76,7 +112,11 @@ impl Works for Pretend {
             Thing::Blend(blend) => {
                 let weights = weights.expect("a blend has weights");
                 assert!(weights.flake_saturation != 666.0, "told to");
-                blend.realise(weights).map_err(|e| refuse(Fault::Request, e.to_string()))?.paint.diffuse
+                blend
+                    .realise(weights)
+                    .map_err(|e| refuse(Fault::Request, e.to_string()))?
+                    .paint
+                    .diffuse
             }
         };
         Ok(format!("{format:?} {diffuse:?}").into_bytes())
@@ -95,8 +135,12 @@ impl Works for Pretend {
 
     fn describe(&self, thing: &Thing) -> Value {
         match thing {
-            Thing::Paint(file) => json!({ "name": file.name, "hash": file.paint.content_hash().to_hex().to_string() }),
-            Thing::Blend(blend) => json!({ "paints": blend.ingredients().map(|(name, _)| name).collect::<Vec<_>>() }),
+            Thing::Paint(file) => {
+                json!({ "name": file.name, "hash": file.paint.content_hash().to_hex().to_string() })
+            }
+            Thing::Blend(blend) => {
+                json!({ "paints": blend.ingredients().map(|(name, _)| name).collect::<Vec<_>>() })
+            }
         }
     }
 }
@@ -122,7 +166,11 @@ impl House {
         let served = tokio::spawn(serve(app, listener, async {
             let _ = stopped.await;
         }));
-        Self { address, stop: Some(stop), served }
+        Self {
+            address,
+            stop: Some(stop),
+            served,
+        }
     }
 
     /// Ends the service as SIGTERM does.
@@ -133,7 +181,13 @@ impl House {
         self.served.await.expect("ends");
     }
 
-    pub async fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]) -> Answer {
+    pub async fn ask(
+        &self,
+        method: &str,
+        path: &str,
+        headers: &[(&str, &str)],
+        body: &[u8],
+    ) -> Answer {
         ask(self.address, method, path, headers, body).await
     }
 
@@ -143,7 +197,14 @@ impl House {
 
     /// Uploads something and gives its id.
     pub async fn paint(&self, words: &str) -> String {
-        let answer = self.ask("POST", "/v1/paints?name=some", &[("Prefer", "wait=60")], words.as_bytes()).await;
+        let answer = self
+            .ask(
+                "POST",
+                "/v1/paints?name=some",
+                &[("Prefer", "wait=60")],
+                words.as_bytes(),
+            )
+            .await;
         assert!([200, 201].contains(&answer.status), "{answer:?}");
         answer.json()["id"].as_str().expect("an id").to_owned()
     }
@@ -163,7 +224,9 @@ impl House {
 
     pub async fn count(&self, name: &str) -> f64 {
         let text = self.get("/metrics").await.text();
-        let line = text.lines().find(|line| line.starts_with(&format!("{name} ")));
+        let line = text
+            .lines()
+            .find(|line| line.starts_with(&format!("{name} ")));
         line.and_then(|line| line.split(' ').nth(1))
             .and_then(|n| n.parse().ok())
             .unwrap_or_else(|| panic!("{name}: {text}"))

@@ -20,17 +20,32 @@ struct Program {
 impl Program {
     fn start(data: &Path) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_carpaint"))
-            .args(["serve", "--json", "--no-samples", "--listen", "127.0.0.1:0", "--data"])
+            .args([
+                "serve",
+                "--json",
+                "--no-samples",
+                "--listen",
+                "127.0.0.1:0",
+                "--data",
+            ])
             .arg(data)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
             .expect("starts");
         let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("its stdout")).read_line(&mut line).expect("says where it listens");
+        BufReader::new(child.stdout.take().expect("its stdout"))
+            .read_line(&mut line)
+            .expect("says where it listens");
         let told: Value = serde_json::from_str(&line).expect("JSON");
-        let address = told["listening"].as_str().and_then(|url| url.strip_prefix("http://")).expect("an address");
-        Self { child, address: address.parse().expect("an address") }
+        let address = told["listening"]
+            .as_str()
+            .and_then(|url| url.strip_prefix("http://"))
+            .expect("an address");
+        Self {
+            child,
+            address: address.parse().expect("an address"),
+        }
     }
 
     /// As `kill -9` does.
@@ -59,7 +74,10 @@ impl Program {
 
 fn sample(name: &str) -> Vec<u8> {
     let sample = sample_by_name(name).expect("a sample");
-    sample.build(&Profile::draft(), &|_| ()).expect("builds").to_bytes()
+    sample
+        .build(&Profile::draft(), &|_| ())
+        .expect("builds")
+        .to_bytes()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -79,10 +97,21 @@ async fn what_was_acknowledged_survives_a_kill() {
     }
     let program = Program::start(data.path());
     for job in &jobs {
-        let paint = program.until_done(job).await["result"].as_str().expect("an address").to_owned();
-        assert_eq!(program.get(&format!("{paint}/measurement")).await.body, white);
+        let paint = program.until_done(job).await["result"]
+            .as_str()
+            .expect("an address")
+            .to_owned();
+        assert_eq!(
+            program.get(&format!("{paint}/measurement")).await.body,
+            white
+        );
     }
-    assert_eq!(program.get("/v1/paints").await.json()["paints"].as_array().map(Vec::len), Some(jobs.len()));
+    assert_eq!(
+        program.get("/v1/paints").await.json()["paints"]
+            .as_array()
+            .map(Vec::len),
+        Some(jobs.len())
+    );
     program.kill();
 }
 
@@ -93,19 +122,37 @@ async fn the_same_bytes_come_after_a_kill_and_a_term_ends_it_quietly() {
     let wait = [("Prefer", "wait=60"), ("Content-Type", "application/json")];
     let mut ids = Vec::new();
     for name in ["white", "blue"] {
-        let answer = ask(program.address, "POST", &format!("/v1/paints?name={name}"), &wait, &sample(name)).await;
+        let answer = ask(
+            program.address,
+            "POST",
+            &format!("/v1/paints?name={name}"),
+            &wait,
+            &sample(name),
+        )
+        .await;
         assert_eq!(answer.status, 201, "{answer:?}");
         ids.push(answer.json()["id"].as_str().expect("an id").to_owned());
     }
     let body = json!({ "paints": ids }).to_string();
-    let blend = ask(program.address, "POST", "/v1/blends", &wait, body.as_bytes()).await;
+    let blend = ask(
+        program.address,
+        "POST",
+        "/v1/blends",
+        &wait,
+        body.as_bytes(),
+    )
+    .await;
     let blend = blend.header("location").expect("an address").to_owned();
-    let paths: Vec<String> =
-        ["realisation.zip?", "realisation.json?", "realisation.paint?", "preview.png?size=48x32&spp=2&"]
-            .iter()
-            .map(|what| format!("{blend}/{what}weights=0.25,0.75"))
-            .chain([blend.clone(), format!("/v1/paints/{}", ids[0])])
-            .collect();
+    let paths: Vec<String> = [
+        "realisation.zip?",
+        "realisation.json?",
+        "realisation.paint?",
+        "preview.png?size=48x32&spp=2&",
+    ]
+    .iter()
+    .map(|what| format!("{blend}/{what}weights=0.25,0.75"))
+    .chain([blend.clone(), format!("/v1/paints/{}", ids[0])])
+    .collect();
     let mut before = Vec::new();
     for path in &paths {
         before.push(program.get(path).await);
@@ -119,13 +166,24 @@ async fn the_same_bytes_come_after_a_kill_and_a_term_ends_it_quietly() {
         program = Program::start(data.path());
         for (path, before) in paths.iter().zip(&before) {
             let after = program.get(path).await;
-            assert_eq!((before.status, after.status, after.etag()), (200, 200, before.etag()), "{path}");
+            assert_eq!(
+                (before.status, after.status, after.etag()),
+                (200, 200, before.etag()),
+                "{path}"
+            );
             assert!(after.body == before.body, "{path}");
         }
     }
-    let told = Command::new("kill").args(["-TERM", &program.child.id().to_string()]).status().expect("sends");
+    let told = Command::new("kill")
+        .args(["-TERM", &program.child.id().to_string()])
+        .status()
+        .expect("sends");
     assert!(told.success());
     let begun = Instant::now();
     let status = program.child.wait().expect("ends");
-    assert!(status.success() && begun.elapsed() < Duration::from_secs(8), "{status} after {:?}", begun.elapsed());
+    assert!(
+        status.success() && begun.elapsed() < Duration::from_secs(8),
+        "{status} after {:?}",
+        begun.elapsed()
+    );
 }

@@ -10,7 +10,10 @@
 //! potentials stay within some ten largest costs, ways within some twenty steps, which makes 2e-14 of the largest cost.
 //! Masses are whole units of 2^-55 or so; a hundred clusters round by less than 1e-14.
 
-#![expect(clippy::needless_for_each, reason = "a line that changes all masses reads best as one")]
+#![expect(
+    clippy::needless_for_each,
+    reason = "a line that changes all masses reads best as one"
+)]
 
 use carpaint::transport::{Cost, Method, Plan, Problem, Solver, Workspace, solve};
 use good_lp::solvers::microlp::microlp;
@@ -25,7 +28,9 @@ const FUZZED: usize = 20_000;
 const WITH_LP_EVERY: usize = 100;
 
 fn fuzzed() -> usize {
-    std::env::var("CARPAINT_FUZZ").map_or(FUZZED, |count| count.parse().expect("CARPAINT_FUZZ is a number"))
+    std::env::var("CARPAINT_FUZZ").map_or(FUZZED, |count| {
+        count.parse().expect("CARPAINT_FUZZ is a number")
+    })
 }
 
 /// Rounding allowed to duals, as a part of the largest cost.
@@ -42,8 +47,13 @@ struct Clouds {
 
 impl Clouds {
     fn problem(&self) -> Problem {
-        Problem::new(&self.source, &self.source_masses, &self.target, &self.target_masses)
-            .unwrap_or_else(|error| panic!("{error}: {self:?}"))
+        Problem::new(
+            &self.source,
+            &self.source_masses,
+            &self.target,
+            &self.target_masses,
+        )
+        .unwrap_or_else(|error| panic!("{error}: {self:?}"))
     }
 }
 
@@ -94,16 +104,32 @@ fn faults(clouds: &Clouds, cost: Cost, plan: &Plan) -> Option<String> {
     }
     let rounding = DUAL_ROUNDING * largest;
     if least_slack < -rounding || least_slack.is_nan() {
-        return Some(format!("duals exceed a cost by {:e} of the largest", -least_slack / largest));
+        return Some(format!(
+            "duals exceed a cost by {:e} of the largest",
+            -least_slack / largest
+        ));
     }
-    let dot = |masses: &[f64], duals: &[f64]| -> f64 { masses.iter().zip(duals).map(|(mass, dual)| mass * dual).sum() };
+    let dot = |masses: &[f64], duals: &[f64]| -> f64 {
+        masses
+            .iter()
+            .zip(duals)
+            .map(|(mass, dual)| mass * dual)
+            .sum()
+    };
     let dual = dot(&p, &plan.source_duals) + dot(&q, &plan.target_duals);
     let gap = spent - dual;
-    if (spent - plan.cost).abs() > 1e-12 * spent || (gap - plan.gap).abs() > rounding + 1e-12 * spent {
-        return Some(format!("cost {} said {}, gap {gap:e} said {:e}", spent, plan.cost, plan.gap));
+    if (spent - plan.cost).abs() > 1e-12 * spent
+        || (gap - plan.gap).abs() > rounding + 1e-12 * spent
+    {
+        return Some(format!(
+            "cost {} said {}, gap {gap:e} said {:e}",
+            spent, plan.cost, plan.gap
+        ));
     }
     if gap > 1e-9 * spent + rounding {
-        return Some(format!("gap {gap:e} of {spent:e}, largest cost {largest:e}"));
+        return Some(format!(
+            "gap {gap:e} of {spent:e}, largest cost {largest:e}"
+        ));
     }
     None
 }
@@ -118,7 +144,12 @@ fn reference(clouds: &Clouds) -> Result<f64, String> {
     let cost: Vec<f64> = clouds
         .source
         .iter()
-        .flat_map(|&from| clouds.target.iter().map(move |&to| Cost::Distance.between(from, to)))
+        .flat_map(|&from| {
+            clouds
+                .target
+                .iter()
+                .map(move |&to| Cost::Distance.between(from, to))
+        })
         .collect();
     let largest = cost.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let objective = x.iter().zip(&cost).map(|(&x, &w)| x * (w / largest));
@@ -195,7 +226,9 @@ impl Paint {
                 phase: [rng.random_range(0.0..6.3), rng.random_range(0.0..6.3)],
             }
         };
-        Self { clusters: (1..=50).map(cluster).collect() }
+        Self {
+            clusters: (1..=50).map(cluster).collect(),
+        }
     }
 
     fn slice(&self, u: f64, v: f64, rng: &mut StdRng) -> (Vec<[f64; 3]>, Vec<f64>) {
@@ -234,8 +267,18 @@ fn paint_slices(seed: u64) -> Vec<Clouds> {
             let (u, v) = (f64::from(place / 30) / 29.0, f64::from(place % 30) / 29.0);
             let (source, source_masses) = from.slice(u, v, rng);
             let (target, target_masses) = to.slice(u, v, rng);
-            let kind = if rng.random_bool(0.3) { kinds[rng.random_range(0..kinds.len())] } else { "smooth" };
-            let mut clouds = Clouds { kind, source, source_masses, target, target_masses };
+            let kind = if rng.random_bool(0.3) {
+                kinds[rng.random_range(0..kinds.len())]
+            } else {
+                "smooth"
+            };
+            let mut clouds = Clouds {
+                kind,
+                source,
+                source_masses,
+                target,
+                target_masses,
+            };
             harden(&mut clouds, rng);
             clouds
         })
@@ -243,7 +286,13 @@ fn paint_slices(seed: u64) -> Vec<Clouds> {
 }
 
 fn harden(clouds: &mut Clouds, rng: &mut StdRng) {
-    let Clouds { kind, source, source_masses: p, target, target_masses: q } = clouds;
+    let Clouds {
+        kind,
+        source,
+        source_masses: p,
+        target,
+        target_masses: q,
+    } = clouds;
     match *kind {
         "dup" => {
             for _ in 0..12 {
@@ -270,9 +319,14 @@ fn harden(clouds: &mut Clouds, rng: &mut StdRng) {
             target.clone_from(source);
             q.clone_from(p);
             if rng.random_bool(0.75) {
-                let (shift, change) = (power_of_ten(rng, -9.0, -1.0), power_of_ten(rng, -9.0, -1.0));
-                target.as_flattened_mut().iter_mut().for_each(|x| *x += shift * normal(rng));
-                q.iter_mut().for_each(|mass| *mass *= (change * normal(rng)).exp());
+                let (shift, change) =
+                    (power_of_ten(rng, -9.0, -1.0), power_of_ten(rng, -9.0, -1.0));
+                target
+                    .as_flattened_mut()
+                    .iter_mut()
+                    .for_each(|x| *x += shift * normal(rng));
+                q.iter_mut()
+                    .for_each(|mass| *mass *= (change * normal(rng)).exp());
             }
         }
         "dominant" => {
@@ -363,7 +417,13 @@ fn nasty(rng: &mut StdRng) -> Clouds {
             target_masses.reverse();
         }
     }
-    Clouds { kind: "nasty", source, source_masses, target, target_masses }
+    Clouds {
+        kind: "nasty",
+        source,
+        source_masses,
+        target,
+        target_masses,
+    }
 }
 
 #[test]
@@ -422,7 +482,12 @@ fn problems_meant_to_break_a_solver_are_certified() {
                         let largest = clouds
                             .source
                             .iter()
-                            .flat_map(|&s| clouds.target.iter().map(move |&t| Cost::Distance.between(s, t)))
+                            .flat_map(|&s| {
+                                clouds
+                                    .target
+                                    .iter()
+                                    .map(move |&t| Cost::Distance.between(s, t))
+                            })
                             .fold(0.0, f64::max);
                         assert!(
                             (plan.cost - optimum).abs() <= 1e-9 * optimum + 1e-12 * largest,
@@ -449,7 +514,10 @@ fn cheap_solvers_are_bounded_by_their_certificates_on_paint_slices() {
                 .unwrap_or_else(|error| panic!("{k}, {}: {error}", clouds.kind));
             let rounding = 1e-12 + 1e-9 * exact.cost;
             assert!(plan.cost >= exact.cost - rounding, "{k}, {method:?}");
-            assert!(plan.cost - plan.gap <= exact.cost + rounding, "{k}, {method:?}");
+            assert!(
+                plan.cost - plan.gap <= exact.cost + rounding,
+                "{k}, {method:?}"
+            );
         }
     }
 }

@@ -36,25 +36,44 @@ fn slice(name: &str) -> [f32; 3] {
 
 /// The files of a good package, for a manifest.
 fn files(manifest: &Value) -> Vec<(String, Vec<u8>)> {
-    let mut files = vec![("color_table.exr".to_owned(), halves([3, 2], |x, y| [0.5, 0.25 * x as f32, y as f32]))];
-    for name in ["flakes/00_00.exr", "flakes/00_01.exr", "flakes/01_00.exr", "flakes/01_01.exr"] {
+    let mut files = vec![(
+        "color_table.exr".to_owned(),
+        halves([3, 2], |x, y| [0.5, 0.25 * x as f32, y as f32]),
+    )];
+    for name in [
+        "flakes/00_00.exr",
+        "flakes/00_01.exr",
+        "flakes/01_00.exr",
+        "flakes/01_01.exr",
+    ] {
         files.push((name.to_owned(), halves([SIDE, SIDE], |_, _| slice(name))));
     }
-    files.push((MANIFEST.to_owned(), serde_json::to_vec(manifest).expect("JSON")));
+    files.push((
+        MANIFEST.to_owned(),
+        serde_json::to_vec(manifest).expect("JSON"),
+    ));
     files
 }
 
 fn zipped(files: &[(String, Vec<u8>)], method: zip::CompressionMethod) -> Vec<u8> {
     let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for (name, bytes) in files {
-        writer.start_file(name.as_str(), SimpleFileOptions::default().compression_method(method)).expect("entry");
+        writer
+            .start_file(
+                name.as_str(),
+                SimpleFileOptions::default().compression_method(method),
+            )
+            .expect("entry");
         writer.write_all(bytes).expect("bytes");
     }
     writer.finish().expect("archive").into_inner()
 }
 
 fn open(manifest: &Value) -> Result<Package, PackageError> {
-    Package::from_bytes(zipped(&files(manifest), zip::CompressionMethod::Stored), &Limits::default())
+    Package::from_bytes(
+        zipped(&files(manifest), zip::CompressionMethod::Stored),
+        &Limits::default(),
+    )
 }
 
 /// What is said about a package whose manifest was changed at a JSON pointer; `null` removes.
@@ -66,25 +85,57 @@ fn refusal(pointer: &str, value: Value) -> String {
         Value::Object(map) => drop(map.insert(key.to_owned(), value)),
         other => other[key.parse::<usize>().expect("index")] = value,
     }
-    open(&manifest).map(|_| ()).expect_err("refused").to_string()
+    open(&manifest)
+        .map(|_| ())
+        .expect_err("refused")
+        .to_string()
 }
 
 #[test]
 fn everything_in_a_good_package_is_found() {
-    for method in [zip::CompressionMethod::Stored, zip::CompressionMethod::Deflated] {
-        let package = Package::from_bytes(zipped(&files(&manifest()), method), &Limits::default()).expect("good");
-        assert_eq!((package.name.as_str(), package.notes["license"].as_str()), ("silver", "CC0-1.0"));
-        assert_eq!(package.coat, Some(Coat { thickness_um: Some(40.0), ..Coat::smooth(1.5) }));
-        let Some(PackageBase::Model { diffuse, lobes, color_table }) = &package.base else { panic!("a model") };
+    for method in [
+        zip::CompressionMethod::Stored,
+        zip::CompressionMethod::Deflated,
+    ] {
+        let package = Package::from_bytes(zipped(&files(&manifest()), method), &Limits::default())
+            .expect("good");
+        assert_eq!(
+            (package.name.as_str(), package.notes["license"].as_str()),
+            ("silver", "CC0-1.0")
+        );
+        assert_eq!(
+            package.coat,
+            Some(Coat {
+                thickness_um: Some(40.0),
+                ..Coat::smooth(1.5)
+            })
+        );
+        let Some(PackageBase::Model {
+            diffuse,
+            lobes,
+            color_table,
+        }) = &package.base
+        else {
+            panic!("a model")
+        };
         assert_eq!((*diffuse, lobes[0].weight), ([0.08; 3], [0.1, 0.1, 0.2]));
         let node = color_table.nodes()[5].to_rgb();
-        assert!(node.iter().zip([0.5, 0.5, 1.0]).all(|(x, y)| (x - y).abs() < 1e-12), "{node:?}");
+        assert!(
+            node.iter()
+                .zip([0.5, 0.5, 1.0])
+                .all(|(x, y)| (x - y).abs() < 1e-12),
+            "{node:?}"
+        );
         let flakes = package.flakes.expect("flakes");
         let mut room = SliceRoom::default();
         for k in (0..4).rev() {
             flakes.read(k, &mut room).expect("a slice");
             let name = flakes.name(k);
-            assert_eq!(room.picture.planes.each_ref().map(|p| p[7]), slice(&name), "{name}");
+            assert_eq!(
+                room.picture.planes.each_ref().map(|p| p[7]),
+                slice(&name),
+                "{name}"
+            );
         }
         let readings = package.multi_angle.expect("readings");
         assert_eq!(readings.rows[1], [45.0, 60.0, 0.0, 0.0]);
@@ -103,39 +154,115 @@ fn a_folder_is_a_package_too() {
     let flakes = package.flakes.expect("flakes");
     flakes.read(3, &mut SliceRoom::default()).expect("a slice");
     std::fs::remove_file(folder.path().join("flakes/01_01.exr")).expect("removed");
-    let error = flakes.read(3, &mut SliceRoom::default()).expect_err("gone").to_string();
-    assert!(error.contains("flakes/01_01.exr is not in the package"), "{error}");
-    let missing = Package::open(folder.path(), &Limits::default()).map(|_| ()).expect_err("missing").to_string();
+    let error = flakes
+        .read(3, &mut SliceRoom::default())
+        .expect_err("gone")
+        .to_string();
+    assert!(
+        error.contains("flakes/01_01.exr is not in the package"),
+        "{error}"
+    );
+    let missing = Package::open(folder.path(), &Limits::default())
+        .map(|_| ())
+        .expect_err("missing")
+        .to_string();
     assert!(missing.contains("flakes/01_01.exr"), "{missing}");
 }
 
 #[test]
 fn a_field_is_refused_by_path_value_and_what_is_accepted() {
     for (pointer, value, parts) in [
-        ("/format", json!("paint"), vec!["format", "\"paint\"", "measured-paint"]),
-        ("/version", json!(2), vec!["version is 2", "up to version 1", "update"]),
+        (
+            "/format",
+            json!("paint"),
+            vec!["format", "\"paint\"", "measured-paint"],
+        ),
+        (
+            "/version",
+            json!(2),
+            vec!["version is 2", "up to version 1", "update"],
+        ),
         ("/version", json!("1"), vec!["version is \"1\""]),
         ("/name", json!(""), vec!["name", "1 to 200"]),
         ("/name", json!(null), vec!["name is missing"]),
-        ("/color_space", json!("rec2020"), vec!["color_space", "rec2020", "linear-srgb-d65"]),
-        ("/clear_coat/ior", json!(0.9), vec!["clear_coat.ior is 0.9", "1 to 4"]),
+        (
+            "/color_space",
+            json!("rec2020"),
+            vec!["color_space", "rec2020", "linear-srgb-d65"],
+        ),
+        (
+            "/clear_coat/ior",
+            json!(0.9),
+            vec!["clear_coat.ior is 0.9", "1 to 4"],
+        ),
         ("/base", json!({}), vec!["base", "exactly one"]),
-        ("/base/model/lobes/0/alpha", json!(-0.1), vec!["base.model.lobes[0].alpha is -0.1", "above 0"]),
-        ("/base/model/lobes/0/weight", json!([1, 2]), vec!["base.model.lobes[0].weight is [1,2]"]),
-        ("/base/model/lobes", json!([]), vec!["base.model.lobes", "1 to 8"]),
-        ("/base/model/color_table/theta_h_deg", json!([30, 30]), vec!["color_table.theta_h_deg", "ascend"]),
-        ("/flakes/theta_h_deg", json!([10, 0]), vec!["flakes.theta_h_deg", "angle 1 is 0", "ascend"]),
-        ("/flakes/theta_i_deg", json!([0, 91]), vec!["flakes.theta_i_deg[1] is 91", "0 to 90"]),
-        ("/flakes/slices", json!("flakes/{h:02}.exr"), vec!["flakes.slices", "{i:02}"]),
-        ("/flakes/size_px", json!([6]), vec!["flakes.size_px", "[width, height]"]),
-        ("/flakes/size_px", json!([60000, 60000]), vec!["flakes.size_px", "pixels"]),
-        ("/flakes/texel_um", json!(0), vec!["flakes.texel_um is 0", "above 0"]),
-        ("/multi_angle/rows/0", json!([15, 1]), vec!["multi_angle.rows[0]", "4 numbers"]),
-        ("/multi_angle/illuminant", json!("A"), vec!["multi_angle.illuminant is \"A\"", "D65"]),
+        (
+            "/base/model/lobes/0/alpha",
+            json!(-0.1),
+            vec!["base.model.lobes[0].alpha is -0.1", "above 0"],
+        ),
+        (
+            "/base/model/lobes/0/weight",
+            json!([1, 2]),
+            vec!["base.model.lobes[0].weight is [1,2]"],
+        ),
+        (
+            "/base/model/lobes",
+            json!([]),
+            vec!["base.model.lobes", "1 to 8"],
+        ),
+        (
+            "/base/model/color_table/theta_h_deg",
+            json!([30, 30]),
+            vec!["color_table.theta_h_deg", "ascend"],
+        ),
+        (
+            "/flakes/theta_h_deg",
+            json!([10, 0]),
+            vec!["flakes.theta_h_deg", "angle 1 is 0", "ascend"],
+        ),
+        (
+            "/flakes/theta_i_deg",
+            json!([0, 91]),
+            vec!["flakes.theta_i_deg[1] is 91", "0 to 90"],
+        ),
+        (
+            "/flakes/slices",
+            json!("flakes/{h:02}.exr"),
+            vec!["flakes.slices", "{i:02}"],
+        ),
+        (
+            "/flakes/size_px",
+            json!([6]),
+            vec!["flakes.size_px", "[width, height]"],
+        ),
+        (
+            "/flakes/size_px",
+            json!([60000, 60000]),
+            vec!["flakes.size_px", "pixels"],
+        ),
+        (
+            "/flakes/texel_um",
+            json!(0),
+            vec!["flakes.texel_um is 0", "above 0"],
+        ),
+        (
+            "/multi_angle/rows/0",
+            json!([15, 1]),
+            vec!["multi_angle.rows[0]", "4 numbers"],
+        ),
+        (
+            "/multi_angle/illuminant",
+            json!("A"),
+            vec!["multi_angle.illuminant is \"A\"", "D65"],
+        ),
     ] {
         let text = refusal(pointer, value);
         assert!(text.starts_with("paint.json: "), "{text}");
-        assert!(parts.iter().all(|part| text.contains(part)), "{pointer}: {text}");
+        assert!(
+            parts.iter().all(|part| text.contains(part)),
+            "{pointer}: {text}"
+        );
     }
 }
 
@@ -143,7 +270,10 @@ fn a_field_is_refused_by_path_value_and_what_is_accepted() {
 fn with_file(name: &str, bytes: Option<Vec<u8>>) -> Vec<(String, Vec<u8>)> {
     let mut files = files(&manifest());
     match bytes {
-        Some(bytes) => files.iter_mut().filter(|(n, _)| n == name).for_each(|(_, b)| b.clone_from(&bytes)),
+        Some(bytes) => files
+            .iter_mut()
+            .filter(|(n, _)| n == name)
+            .for_each(|(_, b)| b.clone_from(&bytes)),
         None => files.retain(|(n, _)| n != name),
     }
     files
@@ -160,21 +290,46 @@ fn all_of_it(files: &[(String, Vec<u8>)]) -> Result<(), PackageError> {
 #[test]
 fn a_file_that_is_wrong_is_refused_by_name() {
     let says = |name: &str, bytes: Option<Vec<u8>>, part: &str| {
-        let text = all_of_it(&with_file(name, bytes)).expect_err("refused").to_string();
+        let text = all_of_it(&with_file(name, bytes))
+            .expect_err("refused")
+            .to_string();
         assert!(text.starts_with(name) && text.contains(part), "{text}");
     };
     says("flakes/01_00.exr", None, "not in the package");
     says("color_table.exr", None, "not in the package");
     says(MANIFEST, None, "not in the package");
     says(MANIFEST, Some(b"{\"format\": ".to_vec()), "no JSON");
-    says("flakes/01_00.exr", Some(halves([6, 7], |_, _| [0.1; 3])), "6 x 7");
+    says(
+        "flakes/01_00.exr",
+        Some(halves([6, 7], |_, _| [0.1; 3])),
+        "6 x 7",
+    );
     says("flakes/01_00.exr", Some(b"no picture".to_vec()), "EXR");
-    says("color_table.exr", Some(halves([2, 3], |_, _| [0.1; 3])), "2 x 3");
-    says("color_table.exr", Some(halves([3, 2], |_, _| [f32::NAN; 3])), "not finite");
-    says("color_table.exr", Some(halves([3, 2], |_, _| [60000.0; 3])), "beyond 2000");
+    says(
+        "color_table.exr",
+        Some(halves([2, 3], |_, _| [0.1; 3])),
+        "2 x 3",
+    );
+    says(
+        "color_table.exr",
+        Some(halves([3, 2], |_, _| [f32::NAN; 3])),
+        "not finite",
+    );
+    says(
+        "color_table.exr",
+        Some(halves([3, 2], |_, _| [60000.0; 3])),
+        "beyond 2000",
+    );
     // One dead pixel of 36 is 2.8 %, two are 5.6 %.
-    let dying =
-        |most: usize| halves([SIDE, SIDE], move |x, y| if y == 0 && x < most { [f32::NAN; 3] } else { [0.1; 3] });
+    let dying = |most: usize| {
+        halves([SIDE, SIDE], move |x, y| {
+            if y == 0 && x < most {
+                [f32::NAN; 3]
+            } else {
+                [0.1; 3]
+            }
+        })
+    };
     assert!(all_of_it(&with_file("flakes/01_00.exr", Some(dying(1)))).is_ok());
     says("flakes/01_00.exr", Some(dying(2)), "2 pixels of 36");
 }
@@ -189,7 +344,11 @@ fn a_cut_archive_is_refused_and_a_changed_one_never_more_than_that() {
     for k in (0..bytes.len()).step_by(3) {
         let mut changed = bytes.clone();
         changed[k] ^= 0x55;
-        if let Ok(Package { flakes: Some(flakes), .. }) = Package::from_bytes(changed, &Limits::default()) {
+        if let Ok(Package {
+            flakes: Some(flakes),
+            ..
+        }) = Package::from_bytes(changed, &Limits::default())
+        {
             let mut room = SliceRoom::default();
             for slice in 0..flakes.slices().min(4) {
                 let _ = flakes.read(slice, &mut room);
@@ -201,14 +360,29 @@ fn a_cut_archive_is_refused_and_a_changed_one_never_more_than_that() {
 #[test]
 fn limits_hold_for_what_an_archive_unpacks_to() {
     let bytes = zipped(&files(&manifest()), zip::CompressionMethod::Deflated);
-    let small = Limits { entries: 5, ..Limits::default() };
-    let text = Package::from_bytes(bytes.clone(), &small).map(|_| ()).expect_err("too many").to_string();
+    let small = Limits {
+        entries: 5,
+        ..Limits::default()
+    };
+    let text = Package::from_bytes(bytes.clone(), &small)
+        .map(|_| ())
+        .expect_err("too many")
+        .to_string();
     assert!(text.contains("6 files") && text.contains("5"), "{text}");
     // A bomb: a color table's name on sixteen megabytes of zeros.
-    let bomb = zipped(&with_file("color_table.exr", Some(vec![0; 16 << 20])), zip::CompressionMethod::Deflated);
+    let bomb = zipped(
+        &with_file("color_table.exr", Some(vec![0; 16 << 20])),
+        zip::CompressionMethod::Deflated,
+    );
     assert!(bomb.len() < 100_000);
-    let text = Package::from_bytes(bomb, &Limits::default()).map(|_| ()).expect_err("a bomb").to_string();
-    assert!(text.contains("color_table.exr") && text.contains("bytes"), "{text}");
+    let text = Package::from_bytes(bomb, &Limits::default())
+        .map(|_| ())
+        .expect_err("a bomb")
+        .to_string();
+    assert!(
+        text.contains("color_table.exr") && text.contains("bytes"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -14,7 +14,8 @@ use super::problem::{Kind, Problem, ProblemDocument};
 use super::{blends, documents, jobs, operations, paints, previews, realisations, runner, works};
 
 /// Only what this service itself serves.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; base-uri 'none'";
+const POLICY: &str =
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; base-uri 'none'";
 
 /// The interface as OpenAPI 3.1.
 #[derive(OpenApi)]
@@ -57,7 +58,9 @@ pub struct Interface;
 #[must_use]
 pub fn interface() -> &'static str {
     static TEXT: LazyLock<String> = LazyLock::new(|| {
-        let mut text = Interface::openapi().to_pretty_json().expect("plain data serialises");
+        let mut text = Interface::openapi()
+            .to_pretty_json()
+            .expect("plain data serialises");
         text.push('\n');
         text
     });
@@ -70,14 +73,25 @@ pub async fn method_not_allowed(path: MatchedPath, method: Method) -> Problem {
         let paths = Interface::openapi().paths.paths.into_iter();
         paths.map(|(path, item)| (path, methods(&item))).collect()
     });
-    let accepted = METHODS.get(path.as_str()).map_or("GET, HEAD", String::as_str);
+    let accepted = METHODS
+        .get(path.as_str())
+        .map_or("GET, HEAD", String::as_str);
     let detail = format!("{} does not take {method}.", path.as_str());
     Problem::new(Kind::MethodNotAllowed, detail).accepting(accepted)
 }
 
 fn methods(item: &PathItem) -> String {
-    let known = [(&item.get, "GET, HEAD"), (&item.post, "POST"), (&item.delete, "DELETE")];
-    known.iter().filter(|(operation, _)| operation.is_some()).map(|(_, name)| *name).collect::<Vec<_>>().join(", ")
+    let known = [
+        (&item.get, "GET, HEAD"),
+        (&item.post, "POST"),
+        (&item.delete, "DELETE"),
+    ];
+    known
+        .iter()
+        .filter(|(operation, _)| operation.is_some())
+        .map(|(_, name)| *name)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// `/openapi.json`
@@ -87,19 +101,31 @@ pub async fn openapi() -> Answer {
 
 /// `/docs`
 pub async fn page() -> Answer {
-    Answer::bytes("text/html; charset=utf-8", &include_bytes!("page.html")[..], Keep::Revalidated)
-        .header(header::CONTENT_SECURITY_POLICY, POLICY)
-        .header(HeaderName::from_static("referrer-policy"), "no-referrer")
+    Answer::bytes(
+        "text/html; charset=utf-8",
+        &include_bytes!("page.html")[..],
+        Keep::Revalidated,
+    )
+    .header(header::CONTENT_SECURITY_POLICY, POLICY)
+    .header(HeaderName::from_static("referrer-policy"), "no-referrer")
 }
 
 /// `/docs/page.js`
 pub async fn script() -> Answer {
-    Answer::bytes("text/javascript; charset=utf-8", &include_bytes!("page.js")[..], Keep::Revalidated)
+    Answer::bytes(
+        "text/javascript; charset=utf-8",
+        &include_bytes!("page.js")[..],
+        Keep::Revalidated,
+    )
 }
 
 /// `/docs/page.css`
 pub async fn style() -> Answer {
-    Answer::bytes("text/css; charset=utf-8", &include_bytes!("page.css")[..], Keep::Revalidated)
+    Answer::bytes(
+        "text/css; charset=utf-8",
+        &include_bytes!("page.css")[..],
+        Keep::Revalidated,
+    )
 }
 
 /// `/problems/{kind}`: what the `type` of a problem means.
@@ -107,7 +133,11 @@ pub async fn problem(Address(name): Address<String>) -> Result<Answer, Problem> 
     let kind = Kind::ALL.into_iter().find(|kind| kind.told().0 == name);
     let (_, title, status) = kind.map(Kind::told).ok_or_else(|| {
         let names: Vec<&str> = Kind::ALL.into_iter().map(|kind| kind.told().0).collect();
-        Problem::new(Kind::UnknownAddress, format!("There is no problem called {name:?}.")).accepting(names.join(", "))
+        Problem::new(
+            Kind::UnknownAddress,
+            format!("There is no problem called {name:?}."),
+        )
+        .accepting(names.join(", "))
     })?;
     let told = serde_json::json!({ "type": format!("/problems/{name}"), "title": title, "status": status.as_u16() });
     Ok(Answer::json(&told, Keep::Revalidated))

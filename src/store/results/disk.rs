@@ -36,8 +36,15 @@ impl ResultFolder {
             fs::create_dir_all(folder)?;
             Ok(entries(folder)?.iter().map(|entry| entry.bytes).sum())
         };
-        let held = open().map_err(StoreError::io(format!("opening the results in {}", folder.display())))?;
-        Ok(Self { folder: folder.to_owned(), limit, held: AtomicU64::new(held) })
+        let held = open().map_err(StoreError::io(format!(
+            "opening the results in {}",
+            folder.display()
+        )))?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            limit,
+            held: AtomicU64::new(held),
+        })
     }
 
     fn place(&self, key: Hash) -> PathBuf {
@@ -60,7 +67,10 @@ impl ResultFolder {
             }
             // What was used last goes last; not every file system minds.
             let _ = file.set_modified(SystemTime::now());
-            Ok(Some(CachedResult { bytes: Bytes::from(bytes), hash: hash.into() }))
+            Ok(Some(CachedResult {
+                bytes: Bytes::from(bytes),
+                hash: hash.into(),
+            }))
         });
         match read.await.ok()? {
             Ok(result) => result,
@@ -129,7 +139,11 @@ fn entries(folder: &Path) -> io::Result<Vec<Entry>> {
             all.extend(entries(&item.path())?);
         } else if let Ok(metadata) = item.metadata() {
             let used = metadata.modified().unwrap_or(SystemTime::UNIX_EPOCH);
-            all.push(Entry { path: item.path(), bytes: metadata.len(), used });
+            all.push(Entry {
+                path: item.path(),
+                bytes: metadata.len(),
+                used,
+            });
         }
     }
     Ok(all)

@@ -53,7 +53,10 @@ struct Landing<E> {
 
 impl<E> Drop for Landing<E> {
     fn drop(&mut self) {
-        self.flights.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.key);
+        self.flights
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .remove(&self.key);
     }
 }
 
@@ -65,11 +68,17 @@ impl<E: Clone + Send + Sync + 'static> ResultCache<E> {
     /// [`StoreError::Io`] when the folder cannot be made or read.
     pub fn open(folder: &Path, memory_bytes: u64, disk_bytes: u64) -> Result<Self, StoreError> {
         let memory = Cache::builder()
-            .weigher(|_, result: &CachedResult| u32::try_from(result.bytes.len() + ENTRY_OVERHEAD).unwrap_or(u32::MAX))
+            .weigher(|_, result: &CachedResult| {
+                u32::try_from(result.bytes.len() + ENTRY_OVERHEAD).unwrap_or(u32::MAX)
+            })
             .max_capacity(memory_bytes)
             .eviction_policy(EvictionPolicy::lru())
             .build();
-        Ok(Self { memory, disk: Arc::new(ResultFolder::open(folder, disk_bytes)?), flights: Arc::default() })
+        Ok(Self {
+            memory,
+            disk: Arc::new(ResultFolder::open(folder, disk_bytes)?),
+            flights: Arc::default(),
+        })
     }
 
     /// The result if it is in memory.
@@ -101,7 +110,10 @@ impl<E: Clone + Send + Sync + 'static> ResultCache<E> {
         }
         let flight = {
             let mut flights = self.flights.lock().unwrap_or_else(PoisonError::into_inner);
-            flights.entry(key).or_insert_with(|| self.begin_flight(key, compute)).clone()
+            flights
+                .entry(key)
+                .or_insert_with(|| self.begin_flight(key, compute))
+                .clone()
         };
         flight.await
     }
@@ -111,7 +123,10 @@ impl<E: Clone + Send + Sync + 'static> ResultCache<E> {
         F: Future<Output = Result<Bytes, E>> + Send + 'static,
     {
         let (sender, receiver) = oneshot::channel();
-        let landing = Landing { flights: Arc::clone(&self.flights), key };
+        let landing = Landing {
+            flights: Arc::clone(&self.flights),
+            key,
+        };
         let (memory, disk) = (self.memory.clone(), Arc::clone(&self.disk));
         tokio::spawn(async move {
             // Ends last: whoever comes before finds the flight, whoever comes after finds the result.
@@ -129,7 +144,10 @@ impl<E: Clone + Send + Sync + 'static> ResultCache<E> {
             match compute().await {
                 Ok(bytes) => {
                     // Hashing takes a millisecond or two a megabyte: not on a thread that others wait for.
-                    let hashed = spawn_blocking(move || CachedResult { hash: Hash::of(&bytes), bytes });
+                    let hashed = spawn_blocking(move || CachedResult {
+                        hash: Hash::of(&bytes),
+                        bytes,
+                    });
                     let Ok(result) = hashed.await else { return };
                     memory.insert(key, result.clone()).await;
                     let _ = sender.send(Ok(result.clone()));
@@ -140,6 +158,12 @@ impl<E: Clone + Send + Sync + 'static> ResultCache<E> {
                 }
             }
         });
-        async move { receiver.await.expect("the computation of a result panicked") }.boxed().shared()
+        async move {
+            receiver
+                .await
+                .expect("the computation of a result panicked")
+        }
+        .boxed()
+        .shared()
     }
 }

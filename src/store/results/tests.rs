@@ -12,7 +12,10 @@ fn open(folder: &Path) -> ResultCache<String> {
 }
 
 async fn must_be_known(cache: &ResultCache<String>, key: Hash) -> CachedResult {
-    cache.get_or_compute(key, || async { panic!("is known") }).await.expect("no error")
+    cache
+        .get_or_compute(key, || async { panic!("is known") })
+        .await
+        .expect("no error")
 }
 
 #[tokio::test]
@@ -27,7 +30,11 @@ async fn sixteen_who_ask_at_once_cost_one_computation() {
                 tokio::time::sleep(Duration::from_millis(20)).await;
                 Ok(Bytes::from_static(b"silver"))
             };
-            cache.get_or_compute(key(1), compute).await.expect("no error").bytes
+            cache
+                .get_or_compute(key(1), compute)
+                .await
+                .expect("no error")
+                .bytes
         }
     };
     let all = futures::future::join_all((0..16).map(ask)).await;
@@ -43,7 +50,11 @@ async fn a_computation_goes_on_when_its_caller_leaves() {
         tokio::time::sleep(Duration::from_millis(50)).await;
         Ok(Bytes::from_static(b"blue"))
     };
-    assert!(tokio::time::timeout(Duration::from_millis(5), cache.get_or_compute(key(1), slow)).await.is_err());
+    assert!(
+        tokio::time::timeout(Duration::from_millis(5), cache.get_or_compute(key(1), slow))
+            .await
+            .is_err()
+    );
     assert_eq!(must_be_known(&cache, key(1)).await.bytes, "blue");
 }
 
@@ -52,9 +63,14 @@ async fn an_error_reaches_all_who_wait_and_is_not_kept() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let cache = open(folder.path());
     let fail = || async { Err("no".to_owned()) };
-    let (a, b) = tokio::join!(cache.get_or_compute(key(1), fail), cache.get_or_compute(key(1), fail));
+    let (a, b) = tokio::join!(
+        cache.get_or_compute(key(1), fail),
+        cache.get_or_compute(key(1), fail)
+    );
     assert_eq!((a, b), (Err("no".to_owned()), Err("no".to_owned())));
-    let result = cache.get_or_compute(key(1), || async { Ok(Bytes::from_static(b"yes")) }).await;
+    let result = cache
+        .get_or_compute(key(1), || async { Ok(Bytes::from_static(b"yes")) })
+        .await;
     assert_eq!(result.expect("computed").bytes, "yes");
 }
 
@@ -76,7 +92,11 @@ fn files(folder: &Path) -> PathBufs {
     let mut all = Vec::new();
     for item in std::fs::read_dir(folder).expect("a folder") {
         let path = item.expect("an entry").path();
-        if path.is_dir() { all.extend(files(&path)) } else { all.push(path) }
+        if path.is_dir() {
+            all.extend(files(&path))
+        } else {
+            all.push(path)
+        }
     }
     all
 }
@@ -86,14 +106,19 @@ async fn the_disk_remembers_and_a_torn_file_is_made_again() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let bytes = Bytes::from(vec![7; 5000]);
     let made = bytes.clone();
-    let first = open(folder.path()).get_or_compute(key(1), || async { Ok(made) }).await.expect("computed");
+    let first = open(folder.path())
+        .get_or_compute(key(1), || async { Ok(made) })
+        .await
+        .expect("computed");
     let file = kept(folder.path()).await.remove(0);
     assert_eq!(must_be_known(&open(folder.path()), key(1)).await, first);
 
     for torn in [&[][..], &bytes[..20], &bytes[..3000]] {
         std::fs::write(&file, torn).expect("tears the file");
         let again = bytes.clone();
-        let result = open(folder.path()).get_or_compute(key(1), || async { Ok(again) }).await;
+        let result = open(folder.path())
+            .get_or_compute(key(1), || async { Ok(again) })
+            .await;
         assert_eq!(result.expect("computed again"), first);
         kept(folder.path()).await;
     }
@@ -104,10 +129,22 @@ async fn the_disk_keeps_to_its_space() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let cache = ResultCache::<String>::open(folder.path(), 0, 100_000).expect("opens");
     for n in 0..40 {
-        cache.get_or_compute(key(n), move || async move { Ok(Bytes::from(vec![n; 10_000])) }).await.expect("computed");
+        cache
+            .get_or_compute(
+                key(n),
+                move || async move { Ok(Bytes::from(vec![n; 10_000])) },
+            )
+            .await
+            .expect("computed");
     }
-    cache.get_or_compute(key(99), || async { Ok(Bytes::from(vec![0; 90_000])) }).await.expect("too large, not kept");
+    cache
+        .get_or_compute(key(99), || async { Ok(Bytes::from(vec![0; 90_000])) })
+        .await
+        .expect("too large, not kept");
     tokio::time::sleep(Duration::from_millis(300)).await;
-    let held: u64 = files(folder.path()).iter().map(|path| path.metadata().expect("a file").len()).sum();
+    let held: u64 = files(folder.path())
+        .iter()
+        .map(|path| path.metadata().expect("a file").len())
+        .sum();
     assert!((10_000..=100_000).contains(&held), "{held}");
 }

@@ -24,7 +24,10 @@ impl Blends for SqliteCatalogue {
 
     fn blend<'a>(&'a self, id: &'a str) -> Task<'a, Option<BlendRecord>> {
         Box::pin(async move {
-            let row = sqlx::query("SELECT * FROM blends WHERE id = ?").bind(id).fetch_optional(&self.read).await?;
+            let row = sqlx::query("SELECT * FROM blends WHERE id = ?")
+                .bind(id)
+                .fetch_optional(&self.read)
+                .await?;
             let Some(row) = row else { return Ok(None) };
             let paints: String = row.try_get("paints")?;
             Ok(Some(BlendRecord {

@@ -9,13 +9,17 @@ use crate::store::{JobBook, JobKind, JobRecord, JobState, NewJob, StoreError, Su
 
 fn record(row: &SqliteRow) -> Result<JobRecord, StoreError> {
     let (kind, state): (String, String) = (row.try_get("kind")?, row.try_get("state")?);
-    let corrupt = |detail: String| StoreError::Corrupt { what: "job", detail };
+    let corrupt = |detail: String| StoreError::Corrupt {
+        what: "job",
+        detail,
+    };
     Ok(JobRecord {
         id: row.try_get("id")?,
         kind: JobKind::of_word(&kind).ok_or_else(|| corrupt(format!("its kind is {kind:?}")))?,
         subject: row.try_get("subject")?,
         request: row.try_get("request")?,
-        state: JobState::of_word(&state).ok_or_else(|| corrupt(format!("its state is {state:?}")))?,
+        state: JobState::of_word(&state)
+            .ok_or_else(|| corrupt(format!("its state is {state:?}")))?,
         attempts: row.try_get("attempts")?,
         problem: row.try_get("problem")?,
     })
@@ -35,27 +39,36 @@ impl JobBook for SqliteCatalogue {
             .bind(&job.request)
             .execute(&mut *transaction)
             .await?;
-            let row = sqlx::query("SELECT * FROM jobs WHERE subject = ? AND state IN ('queued', 'running')")
-                .bind(&job.subject)
-                .fetch_one(&mut *transaction)
-                .await?;
+            let row = sqlx::query(
+                "SELECT * FROM jobs WHERE subject = ? AND state IN ('queued', 'running')",
+            )
+            .bind(&job.subject)
+            .fetch_one(&mut *transaction)
+            .await?;
             transaction.commit().await?;
-            Ok(Submitted { job: record(&row)?, new: inserted.rows_affected() == 1 })
+            Ok(Submitted {
+                job: record(&row)?,
+                new: inserted.rows_affected() == 1,
+            })
         })
     }
 
     fn job<'a>(&'a self, id: &'a str) -> Task<'a, Option<JobRecord>> {
         Box::pin(async move {
-            let row = sqlx::query("SELECT * FROM jobs WHERE id = ?").bind(id).fetch_optional(&self.read).await?;
+            let row = sqlx::query("SELECT * FROM jobs WHERE id = ?")
+                .bind(id)
+                .fetch_optional(&self.read)
+                .await?;
             row.as_ref().map(record).transpose()
         })
     }
 
     fn unfinished_jobs(&self) -> Task<'_, Vec<JobRecord>> {
         Box::pin(async move {
-            let rows = sqlx::query("SELECT * FROM jobs WHERE state IN ('queued', 'running') ORDER BY seq")
-                .fetch_all(&self.read)
-                .await?;
+            let rows =
+                sqlx::query("SELECT * FROM jobs WHERE state IN ('queued', 'running') ORDER BY seq")
+                    .fetch_all(&self.read)
+                    .await?;
             rows.iter().map(record).collect()
         })
     }
@@ -83,7 +96,12 @@ impl JobBook for SqliteCatalogue {
         })
     }
 
-    fn end_job<'a>(&'a self, id: &'a str, state: JobState, problem: Option<&'a str>) -> Task<'a, bool> {
+    fn end_job<'a>(
+        &'a self,
+        id: &'a str,
+        state: JobState,
+        problem: Option<&'a str>,
+    ) -> Task<'a, bool> {
         Box::pin(async move {
             let ended =
                 sqlx::query("UPDATE jobs SET state = ?, problem = ? WHERE id = ? AND state IN ('queued', 'running')")

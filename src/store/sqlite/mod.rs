@@ -38,9 +38,15 @@ impl SqliteCatalogue {
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full)
             .busy_timeout(Duration::from_secs(10));
-        let write = SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await?;
+        let write = SqlitePoolOptions::new()
+            .max_connections(1)
+            .connect_with(options.clone())
+            .await?;
         sqlx::migrate!("src/store/migrations").run(&write).await?;
-        let read = SqlitePoolOptions::new().max_connections(READERS).connect_with(options.read_only(true)).await?;
+        let read = SqlitePoolOptions::new()
+            .max_connections(READERS)
+            .connect_with(options.read_only(true))
+            .await?;
         Ok(Self { write, read })
     }
 
@@ -75,5 +81,8 @@ impl Catalogue for SqliteCatalogue {
 }
 
 fn hash(text: &str, what: &'static str) -> Result<Hash, StoreError> {
-    text.parse().map_err(|error| StoreError::Corrupt { what, detail: format!("{text:?} is no hash: {error}") })
+    text.parse().map_err(|error| StoreError::Corrupt {
+        what,
+        detail: format!("{text:?} is no hash: {error}"),
+    })
 }

@@ -41,12 +41,20 @@ impl Paints for SqliteCatalogue {
 
     fn paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>> {
         Box::pin(async move {
-            let row = sqlx::query("SELECT * FROM paints WHERE id = ?").bind(id).fetch_optional(&self.read).await?;
+            let row = sqlx::query("SELECT * FROM paints WHERE id = ?")
+                .bind(id)
+                .fetch_optional(&self.read)
+                .await?;
             row.as_ref().map(record).transpose()
         })
     }
 
-    fn paints<'a>(&'a self, q: Option<&'a str>, cursor: Option<i64>, limit: u32) -> Task<'a, PaintPage> {
+    fn paints<'a>(
+        &'a self,
+        q: Option<&'a str>,
+        cursor: Option<i64>,
+        limit: u32,
+    ) -> Task<'a, PaintPage> {
         Box::pin(async move {
             // One more than asked for tells whether there is a next page.
             let rows = sqlx::query(
@@ -63,14 +71,19 @@ impl Paints for SqliteCatalogue {
                 Some(last) if rows.len() > page.len() => Some(last.try_get("seq")?),
                 _ => None,
             };
-            Ok(PaintPage { paints: page.iter().map(record).collect::<Result<_, _>>()?, next })
+            Ok(PaintPage {
+                paints: page.iter().map(record).collect::<Result<_, _>>()?,
+                next,
+            })
         })
     }
 
     fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>> {
         Box::pin(async move {
-            let row =
-                sqlx::query("DELETE FROM paints WHERE id = ? RETURNING *").bind(id).fetch_optional(&self.write).await?;
+            let row = sqlx::query("DELETE FROM paints WHERE id = ? RETURNING *")
+                .bind(id)
+                .fetch_optional(&self.write)
+                .await?;
             row.as_ref().map(record).transpose()
         })
     }
