@@ -42,7 +42,7 @@ pub use limits::Limits;
 pub use lobe::Lobe;
 pub use reflectance::{Chi, Reflectance, Terms};
 pub use residuals::{FitResiduals, InstrumentError, LuminanceError};
-pub use sparkle::{FlakeSampler, TexelDraw};
+pub use sparkle::{FlakeSampler, TexelDraw, cumulative};
 pub use validate::{MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError};
 
 use crate::color::LinearRgb;
