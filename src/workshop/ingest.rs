@@ -82,7 +82,11 @@ pub fn open_measurement(
         let package = Package::open(path, &options.limits).map_err(|e| wrong(&e))?;
         return Ok(Measurement::Package(Box::new(package)));
     }
-    let bytes = read(path, &options.limits)?;
+    let held = Limits {
+        bytes: options.limits.bytes.min(options.limits.table_bytes),
+        ..options.limits
+    };
+    let bytes = read(path, &held)?;
     let brdf =
         BrdfMeasurement::read(&bytes, &options.read, &options.limits).map_err(|e| wrong(&e))?;
     Ok(Measurement::Brdf(Box::new(brdf), blake3::hash(&bytes)))
