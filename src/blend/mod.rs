@@ -11,6 +11,7 @@
 //! Left to others: solving a transport problem (`transport`), reducing clusters of a paint that has too many (`fit`).
 
 mod base;
+mod boxes;
 mod clamp;
 mod correspondence;
 mod file;

@@ -79,6 +79,26 @@ impl Flakes {
         }
     }
 
+    /// The flakes as they are at one slice, at every angle: for those who draw nowhere else.
+    ///
+    /// # Panics
+    ///
+    /// When an index is outside the grid.
+    #[must_use]
+    pub fn only(&self, theta_h: usize, theta_d: usize) -> Self {
+        let slice = self.slice(theta_h, theta_d);
+        let clusters = u32::try_from(slice.probability.len()).unwrap_or(u32::MAX);
+        Self {
+            theta_h: AngleGrid::single(),
+            theta_d: AngleGrid::single(),
+            offsets: vec![0, clusters],
+            probability: slice.probability.to_vec(),
+            lower: slice.lower.to_vec(),
+            upper: slice.upper.to_vec(),
+            texture: self.texture,
+        }
+    }
+
     /// How many slices.
     #[must_use]
     pub fn slices(&self) -> usize {
