@@ -34,10 +34,19 @@ pub(super) fn common_grid<'a>(
     }
 }
 
-/// Coats blend linearly; an uncoated paint is a coat of index 1, as rough and thick as its partners'.
+/// Coats blend linearly; an uncoated paint is a coat of index 1, as rough and thick as its partners' mean.
 pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> Option<Coat> {
-    let first = paints.iter().find_map(|p| p.coat)?;
-    let of = |paint: &BlendedPaint| paint.coat.unwrap_or(Coat { ior: 1.0, ..first });
+    let coats: Vec<Coat> = paints.iter().filter_map(|p| p.coat).collect();
+    if coats.is_empty() {
+        return None;
+    }
+    let mean = |get: &dyn Fn(&Coat) -> f64| coats.iter().map(get).sum::<f64>() / coats.len() as f64;
+    let stand_in = Coat {
+        ior: 1.0,
+        roughness: mean(&|c| c.roughness),
+        thickness_um: Some(mean(&|c| c.thickness_um.unwrap_or(0.0))),
+    };
+    let of = |paint: &BlendedPaint| paint.coat.unwrap_or(stand_in);
     let mix = |get: &dyn Fn(Coat) -> f64| {
         paints
             .iter()

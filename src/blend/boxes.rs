@@ -85,34 +85,34 @@ where
         .map(|axes| std::array::from_fn(|k| weight(axes[k % 3])))
         .collect();
     let clusters = paints.first().map_or(0, |p| p.lower.len());
-    let mut lower = vec![[0.0_f32; 3]; clusters];
-    let mut upper = vec![[0.0_f32; 3]; clusters];
+    let (mut lower, mut upper) = (Vec::with_capacity(clusters), Vec::with_capacity(clusters));
     let mut account = Account::default();
     let (mut low, mut high) = ([T::default(); BLOCK], [T::default(); BLOCK]);
-    let targets = lower.as_flattened_mut().chunks_mut(BLOCK);
-    for (block, (to_low, to_high)) in targets
-        .zip(upper.as_flattened_mut().chunks_mut(BLOCK))
-        .enumerate()
-    {
-        let here = block * BLOCK..block * BLOCK + to_low.len();
-        let (low, high) = (&mut low[..to_low.len()], &mut high[..to_low.len()]);
+    let (mut to_low, mut to_high) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
+    for first in (0..3 * clusters).step_by(BLOCK) {
+        let here = first..(first + BLOCK).min(3 * clusters);
+        let count = here.len();
+        let (low, high) = (&mut low[..count], &mut high[..count]);
+        let (to_low, to_high) = (&mut to_low[..count], &mut to_high[..count]);
         low.fill(T::default());
         high.fill(T::default());
         for (own, pattern) in paints.iter().zip(&patterns) {
             add(low, &own.lower.as_flattened()[here.clone()], pattern);
             add(high, &own.upper.as_flattened()[here.clone()], pattern);
         }
-        for (to, &from) in to_low.iter_mut().zip(&*low) {
-            *to = texel(from);
+        let mut odd = 0;
+        for k in 0..count {
+            (to_low[k], to_high[k]) = (texel(low[k]), texel(high[k]));
+            odd |= is_odd(to_low[k], to_high[k]);
         }
-        for (to, &from) in to_high.iter_mut().zip(&*high) {
-            *to = texel(from);
-        }
-        if is_odd(to_low, to_high) {
-            for (k, (to_low, to_high)) in to_low.iter_mut().zip(to_high).enumerate() {
-                account.mend(to_low, to_high, [exact(low[k]), exact(high[k])]);
+        if odd != 0 {
+            for k in 0..count {
+                let exact = [exact(low[k]), exact(high[k])];
+                account.mend(&mut to_low[k], &mut to_high[k], exact);
             }
         }
+        lower.extend_from_slice(to_low.as_chunks().0);
+        upper.extend_from_slice(to_high.as_chunks().0);
     }
     Mixed {
         lower,
@@ -137,14 +137,11 @@ where
     }
 }
 
-/// Whether any box is inside out or beyond the bound.
+/// Not 0 where a side is inside out or beyond the bound.
 #[allow(clippy::cast_possible_truncation)] // 2000 is exact
-fn is_odd(low: &[f32], high: &[f32]) -> bool {
-    let most = MAX_LAB as f32;
-    let odd = low.iter().zip(high).fold(0, |odd, (&l, &h)| {
-        odd | u32::from(h < l) | u32::from(h > most) | u32::from(l < -most)
-    });
-    odd != 0
+fn is_odd(low: f32, high: f32) -> u32 {
+    const MOST: f32 = MAX_LAB as f32;
+    u32::from(high < low) | u32::from(high > MOST) | u32::from(low < -MOST)
 }
 
 #[cfg(test)]

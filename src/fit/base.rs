@@ -119,10 +119,10 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
     };
     // Inside a coat light never leaves the cone of total reflection.
     let cone = match frame {
-        Frame::Inside(ior) if ior > 1.0 => (1.0 / ior).asin().to_degrees() + 5.0,
+        Frame::Inside(ior) if ior > 1.0 => ((1.0 / ior).asin().to_degrees() + 5.0).min(TRUSTED_DEG),
         _ => TRUSTED_DEG,
     };
-    let samples = measure(measured, SAMPLES, cone.min(TRUSTED_DEG), 0xBA5E);
+    let samples = measure(measured, SAMPLES, cone, 0xBA5E);
     if samples.len() < LEAST_SAMPLES {
         return Err(FitError::TooFewSamples {
             found: samples.len(),
@@ -134,7 +134,7 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
         return Err(FitError::Dark);
     }
     let unit = unit_of(&samples);
-    let judge = Judge::new(measured, frame, unit);
+    let judge = Judge::new(measured, frame, cone, unit);
     let floors = judge.floor_errors();
     let mut candidates: Vec<Candidate> = Vec::new();
     for search in searches {
