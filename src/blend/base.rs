@@ -34,7 +34,8 @@ pub(super) fn common_grid<'a>(
     }
 }
 
-/// Coats blend linearly; an uncoated paint is a coat of index 1, as rough and thick as its partners'.
+/// Coats blend linearly; an uncoated paint is a coat of index 1, as rough as its partners', and one whose thickness nobody
+/// stated is as thick as theirs. Paints of weight 0 have no say in whether there is a coat or a thickness at all.
 pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> Option<Coat> {
     let first = paints.iter().find_map(|p| p.coat)?;
     let of = |paint: &BlendedPaint| paint.coat.unwrap_or(Coat { ior: 1.0, ..first });
@@ -45,20 +46,23 @@ pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger
             .map(|(p, w)| w * get(of(p)))
             .sum::<f64>()
     };
+    let coats = || {
+        let taking_part = paints.iter().zip(weights).filter(|(_, w)| **w != 0.0);
+        taking_part.filter_map(|(paint, _)| paint.coat)
+    };
     let ior = ledger.hold("coat.ior", mix(&|c| c.ior), 1.0, 4.0);
-    if ior == 1.0 {
+    // A coat of index 1 reflects and bends nothing, but a paint that has one gets it back.
+    if ior == 1.0 && !coats().any(|coat| coat.ior == 1.0) {
         return None;
     }
-    let thick = paints
-        .iter()
-        .all(|p| p.coat.is_none_or(|c| c.thickness_um.is_some()));
+    let stated = coats().find_map(|coat| coat.thickness_um);
     Some(Coat {
         ior,
         roughness: ledger.hold("coat.roughness", mix(&|c| c.roughness), 0.0, 1.0),
-        thickness_um: thick.then(|| {
+        thickness_um: stated.map(|thickness| {
             ledger.hold(
                 "coat.thickness_um",
-                mix(&|c| c.thickness_um.unwrap_or(0.0)),
+                mix(&|c| c.thickness_um.unwrap_or(thickness)),
                 0.0,
                 1e6,
             )
