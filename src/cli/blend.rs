@@ -10,7 +10,7 @@ use super::ingest::ReadingArgs;
 use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
-use crate::workshop::{WorkshopError, blend_paints, open_paint};
+use crate::workshop::{WorkshopError, blend_paints, describe_blend, open_paint};
 
 /// Find how the flakes of 2 to 5 paints become one another, and keep it as a .blend.
 ///
@@ -59,17 +59,17 @@ impl Blend {
             });
             output::replace(timings, seconds.to_string().as_bytes())?;
         }
-        let report = made.blend.report();
+        let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
         if json {
-            let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
+            let correspondence = &describe_blend(&made.blend)["correspondence"];
             return output::print_json(
-                &json!({ "out": self.out, "paints": names, "correspondence": report, "notes": made.notes }),
+                &json!({ "out": self.out, "paints": names, "correspondence": correspondence, "notes": made.notes }),
             );
         }
         for note in &made.notes {
             eprintln!("note: {note}");
         }
-        let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
+        let report = made.blend.report();
         eprintln!(
             "{}: {} · {} slices, {} clusters, mean transport {:.2} Lab",
             self.out.display(),

@@ -6,7 +6,7 @@ use super::container::{Container, ContainerError, Writer};
 use super::energy::EnergyCertificate;
 use super::{
     AngleGrid, CarPaint, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes, Limits, Lobe,
-    PaintError,
+    PaintError, Realisation,
 };
 use crate::color::{Lab, LinearRgb};
 
@@ -25,6 +25,9 @@ pub struct Provenance {
     /// Whether the flakes were simulated instead of measured.
     #[serde(default)]
     pub simulated_flakes: bool,
+    /// Of which blend it is a realisation, where it is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub realisation: Option<Realisation>,
     /// What else the source said about itself: license, instrument, maker, color code, date.
     #[serde(default, skip_serializing_if = "std::collections::BTreeMap::is_empty")]
     pub notes: std::collections::BTreeMap<String, String>,
