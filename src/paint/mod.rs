@@ -43,7 +43,9 @@ pub use limits::Limits;
 pub use lobe::Lobe;
 pub use realisation::{Clamp, Realisation};
 pub use reflectance::{Chi, Reflectance, Terms};
-pub use residuals::{FitResiduals, InstrumentError, LuminanceError};
+pub use residuals::{
+    FitResiduals, InstrumentError, LuminanceError, ReadingError, ReadingResiduals,
+};
 pub use sparkle::{FlakeSampler, TexelDraw, cumulative};
 pub use validate::{MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError};
 

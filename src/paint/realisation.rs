@@ -26,7 +26,10 @@ impl std::fmt::Display for Clamp {
             of,
             worst,
         } = self;
-        write!(f, "{field}: {bound}, {count} of {of}, the worst by {worst:.4}")
+        write!(
+            f,
+            "{field}: {bound}, {count} of {of}, the worst by {worst:.4}"
+        )
     }
 }
 

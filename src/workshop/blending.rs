@@ -5,6 +5,7 @@ use crate::accuracy::Profile;
 use crate::blend::{Blend, BlendError, Ingredient, Origin, Reduction};
 use crate::fit::reduce_clusters;
 use crate::paint::{CarPaint, Flakes, PaintFile};
+use crate::transport::TransportError;
 
 /// A new blend and what was done on the way.
 #[derive(Clone, Debug)]
@@ -43,6 +44,13 @@ pub fn blend_paints(
             BlendError::Paints(_) | BlendError::Angles { .. } => {
                 WorkshopError::usage("paints", error)
             }
+            BlendError::Transport {
+                source: TransportError::TooManyPoints { .. },
+                ..
+            } => WorkshopError::usage(
+                "clusters",
+                format!("{error}: blend paints with fewer clusters, or fewer paints"),
+            ),
             _ => WorkshopError::internal(error),
         })?;
     let origins = paints.iter().zip(&reduced).map(|(file, reduced)| Origin {

@@ -46,6 +46,7 @@ pub fn describe_paint(file: &PaintFile) -> Value {
         })),
         "readings": { "illuminant": "D65", "observer": "2", "illumination_deg": 45, "rows": readings },
         "residuals": file.residuals,
+        "multi_angle": file.readings,
         "clamps": file.provenance.realisation.as_ref().map_or(&[][..], |of| &of.clamps),
         "energy": file.energy,
         "warnings": file.warnings,

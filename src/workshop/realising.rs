@@ -192,6 +192,7 @@ fn paint_file(chosen: &Chosen) -> PaintFile {
         paint: chosen.paint.clone(),
         clustering,
         residuals: None,
+        readings: None,
         warnings: chosen.clamps.iter().map(Clamp::to_string).collect(),
     }
 }
