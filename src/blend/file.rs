@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Blend, BlendSettings, BlendedFlakes, BlendedPaint, Boxes, CorrespondenceReport, PAINTS,
+    Blend, BlendSettings, BlendedFlakes, BlendedPaint, Boxes, CorrespondenceReport, Origin, PAINTS,
 };
 use crate::color::{Lab, LinearRgb};
 use crate::paint::{
@@ -53,6 +53,8 @@ struct PaintHeader {
     diffuse: LinearRgb,
     lobes: Vec<Lobe>,
     chi_overall: Lab,
+    #[serde(default, skip_serializing_if = "Origin::is_plain")]
+    origin: Origin,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -230,6 +232,7 @@ impl PaintHeader {
             diffuse: paint.diffuse,
             lobes: paint.lobes.clone(),
             chi_overall: paint.color_table.overall(),
+            origin: paint.origin,
         }
     }
 
@@ -240,6 +243,7 @@ impl PaintHeader {
             coat,
             diffuse,
             lobes,
+            origin,
             ..
         } = self;
         BlendedPaint {
@@ -249,6 +253,7 @@ impl PaintHeader {
             diffuse,
             lobes,
             color_table,
+            origin,
         }
     }
 }

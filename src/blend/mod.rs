@@ -17,12 +17,14 @@ mod correspondence;
 mod file;
 mod lobes;
 mod mixture;
+mod origin;
 mod realise;
 mod weights;
 
 pub use clamp::Clamp;
 pub use correspondence::{BlendSettings, CorrespondenceReport};
 pub use file::BlendFileError;
+pub use origin::{Origin, Reduction};
 pub use realise::Realised;
 pub use weights::{RealisationWeights, WeightError};
 
@@ -64,6 +66,7 @@ pub(crate) struct BlendedPaint {
     pub diffuse: [f64; 3],
     pub lobes: Vec<Lobe>,
     pub color_table: ColorTable,
+    pub origin: Origin,
 }
 
 /// Corresponding clusters of all paints on their common angles.
@@ -153,6 +156,7 @@ impl Blend {
                     diffuse: paint.diffuse,
                     lobes: paint.lobes.clone(),
                     color_table: paint.color_table.on(&chi_h, &chi_d),
+                    origin: Origin::default(),
                 }
             })
             .collect();
@@ -197,7 +201,27 @@ impl Blend {
             .map(|&k| (self.paints[k].name.as_str(), self.paints[k].hash.as_str()))
     }
 
-    /// How the correspondence was found and how good it is.
+    /// The same blend with what is known of its paints, in the order asked for.
+    #[must_use]
+    pub fn with_origins(mut self, origins: impl IntoIterator<Item = Origin>) -> Self {
+        for (&place, origin) in self.asked.iter().zip(origins) {
+            self.paints[place].origin = origin;
+        }
+        self
+    }
+
+    /// What is known of each paint, in the order asked for.
+    pub fn origins(&self) -> impl Iterator<Item = Origin> + Clone {
+        self.asked.iter().map(|&place| self.paints[place].origin)
+    }
+
+    /// Which paint in the order asked for stands at this place in the order of content hashes.
+    #[must_use]
+    pub fn asked_at(&self, place: usize) -> Option<usize> {
+        self.asked.iter().position(|&own| own == place)
+    }
+
+    /// How the correspondence was found and how good it is; its places are those in the order of content hashes.
     #[must_use]
     pub const fn report(&self) -> &CorrespondenceReport {
         &self.report

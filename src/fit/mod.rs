@@ -20,14 +20,17 @@ mod grain;
 mod least_squares;
 mod lifetime;
 mod lobes;
+mod readings;
 mod reduce;
 mod residual;
 mod simulate;
+mod steps;
 mod texels;
 
-pub use base::{CoatChoice, FitError, FittedBase, fit_base};
+pub use base::{CoatChoice, FitError, FittedBase, fit_base, fit_base_telling};
 pub use boxes::BoxRule;
 pub use clusters::{ClusterSettings, Clusterer, NoTexel, SliceClusters};
 pub use flakes::{FittedFlakes, FlakeFitError, Progress, fit_flakes};
+pub use readings::against_readings;
 pub use reduce::reduce_clusters;
 pub use simulate::{FlakeRecipe, simulate_flakes};

@@ -6,7 +6,7 @@ use super::container::{Container, ContainerError, Writer};
 use super::energy::EnergyCertificate;
 use super::{
     AngleGrid, CarPaint, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes, Limits, Lobe,
-    PaintError,
+    PaintError, ReadingResiduals, Realisation,
 };
 use crate::color::{Lab, LinearRgb};
 
@@ -25,6 +25,9 @@ pub struct Provenance {
     /// Whether the flakes were simulated instead of measured.
     #[serde(default)]
     pub simulated_flakes: bool,
+    /// Of which blend it is a realisation, where it is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub realisation: Option<Realisation>,
     /// What else the source said about itself: license, instrument, maker, color code, date.
     #[serde(default, skip_serializing_if = "std::collections::BTreeMap::is_empty")]
     pub notes: std::collections::BTreeMap<String, String>,
@@ -56,6 +59,8 @@ pub struct PaintFile {
     pub clustering: Option<Clustering>,
     /// How well the base fits its measurement, where it was fitted.
     pub residuals: Option<FitResiduals>,
+    /// How far the paint is from the multi-angle readings that came with its measurement, where some did.
+    pub readings: Option<ReadingResiduals>,
     /// Energy certificate.
     pub energy: EnergyCertificate,
     /// What the user should know: dirty data, averaged azimuths, energy above 1, clamped values.
@@ -81,6 +86,8 @@ struct Header {
     physical: PhysicalHeader,
     clustering: Option<Clustering>,
     residuals: Option<FitResiduals>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    readings: Option<ReadingResiduals>,
     energy: EnergyCertificate,
     warnings: Vec<String>,
 }
@@ -175,6 +182,7 @@ impl PaintFile {
             physical: PhysicalHeader::of(&self.paint),
             clustering: self.clustering.clone(),
             residuals: self.residuals.clone(),
+            readings: self.readings.clone(),
             energy: self.energy.clone(),
             warnings: self.warnings.clone(),
         };
@@ -230,6 +238,7 @@ impl PaintFile {
             paint,
             clustering: header.clustering,
             residuals: header.residuals,
+            readings: header.readings,
             energy: header.energy,
             warnings: header.warnings,
         })

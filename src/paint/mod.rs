@@ -22,6 +22,7 @@ mod file;
 mod flakes;
 mod limits;
 mod lobe;
+mod realisation;
 mod reflectance;
 mod residuals;
 mod sparkle;
@@ -40,8 +41,11 @@ pub use file::{Clustering, PaintFile, PaintFileError, Provenance};
 pub use flakes::{FlakeTexture, Flakes, Slice};
 pub use limits::Limits;
 pub use lobe::Lobe;
+pub use realisation::{Clamp, Realisation};
 pub use reflectance::{Chi, Reflectance, Terms};
-pub use residuals::{FitResiduals, InstrumentError, LuminanceError};
+pub use residuals::{
+    FitResiduals, InstrumentError, LuminanceError, ReadingError, ReadingResiduals,
+};
 pub use sparkle::{FlakeSampler, TexelDraw, cumulative};
 pub use validate::{MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError};
 

@@ -77,6 +77,7 @@ impl Works for Pretend {
             paint,
             clustering: None,
             residuals: None,
+            readings: None,
             warnings: Vec::new(),
         })
     }
