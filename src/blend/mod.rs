@@ -16,12 +16,16 @@ mod correspondence;
 mod file;
 mod lobes;
 mod mixture;
+mod order;
+mod pairs;
 mod realise;
 mod weights;
 
 pub use clamp::Clamp;
 pub use correspondence::{BlendSettings, CorrespondenceReport};
 pub use file::BlendFileError;
+pub use order::Order;
+pub use pairs::PairReport;
 pub use realise::Realised;
 pub use weights::{RealisationWeights, WeightError};
 

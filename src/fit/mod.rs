@@ -24,10 +24,12 @@ mod reduce;
 mod residual;
 mod simulate;
 mod texels;
+mod thinned;
 
 pub use base::{CoatChoice, FitError, FittedBase, fit_base};
 pub use boxes::BoxRule;
 pub use clusters::{ClusterSettings, Clusterer, NoTexel, SliceClusters};
 pub use flakes::{FittedFlakes, FlakeFitError, Progress, fit_flakes};
 pub use reduce::reduce_clusters;
-pub use simulate::{FlakeRecipe, simulate_flakes};
+pub use simulate::{FlakeRecipe, SimulatedPatch, simulate_flakes};
+pub use thinned::Thinned;

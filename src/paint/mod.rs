@@ -20,6 +20,7 @@ mod direction;
 mod energy;
 mod file;
 mod flakes;
+mod lightness;
 mod limits;
 mod lobe;
 mod reflectance;
@@ -38,10 +39,11 @@ pub use direction::{ASPECULAR_DEG, Direction, HalfAngles, half_angles, instrumen
 pub use energy::{EnergyCertificate, certify};
 pub use file::{Clustering, PaintFile, PaintFileError, Provenance};
 pub use flakes::{FlakeTexture, Flakes, Slice};
+pub use lightness::LightnessMixture;
 pub use limits::Limits;
 pub use lobe::Lobe;
 pub use reflectance::{Chi, Reflectance, Terms};
-pub use residuals::{FitResiduals, InstrumentError, LuminanceError};
+pub use residuals::{ClusteringError, FitResiduals, InstrumentError, LuminanceError, Percentiles};
 pub use sparkle::{FlakeSampler, TexelDraw};
 pub use validate::{MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError};
 

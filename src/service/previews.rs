@@ -13,9 +13,9 @@ use super::app::{App, Shelved};
 use super::extract::{Address, Query, QueryOfTwo};
 use super::ids;
 use super::problem::{Problem, ProblemDocument};
+use super::profile::ProfileText;
 use super::weights::WeightQuery;
-use super::works::{Accuracy, PictureFormat, Preset, Scene, View, WorkError};
-use super::workshop::profile;
+use super::works::{PictureFormat, Scene, View};
 use crate::blend::RealisationWeights;
 
 /// Longest side of a picture.
@@ -36,8 +36,9 @@ pub struct ViewQuery {
     /// Samples per pixel, in place of the profile's.
     #[param(minimum = 1, maximum = 4096)]
     spp: Option<u32>,
-    /// Accuracy.
-    profile: Option<Preset>,
+    /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `draft,samples_per_pixel=100`.
+    #[param(value_type = Option<String>, example = "standard")]
+    profile: Option<ProfileText>,
 }
 
 /// `WxH` in pixels.
@@ -78,12 +79,10 @@ impl ViewQuery {
                     .accepting(format!("1 to {most}")));
             }
             None => {
-                let accuracy = Accuracy {
-                    profile: self.profile.unwrap_or_default(),
-                    clusters: None,
-                };
-                profile(accuracy)
-                    .map_err(|error| WorkError::from(error).of_query())?
+                self.profile
+                    .clone()
+                    .unwrap_or_default()
+                    .of_query()?
                     .samples_per_pixel
             }
         };

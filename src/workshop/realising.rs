@@ -182,7 +182,9 @@ fn paint_file(chosen: &Chosen) -> PaintFile {
     let clustering = chosen.paint.flakes.as_ref().map(|f| Clustering {
         clusters: f.widest_slice(),
         box_rule: "blended".to_owned(),
-        w1: None,
+        angle_step: 1,
+        w1_bound: None,
+        error: None,
     });
     PaintFile {
         name: chosen.name.chars().take(200).collect(),
