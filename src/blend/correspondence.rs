@@ -31,6 +31,17 @@ pub struct BlendSettings {
     pub order: Order,
 }
 
+/// How far a blend at equal weights is, at one instrument geometry, from the blend by exact transport.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BlendDeviation {
+    /// Aspecular angle, degrees.
+    pub aspecular_deg: f64,
+    /// CIEDE2000 of the mean color.
+    pub delta_e_2000: f64,
+    /// Relative difference of the 99.9th percentile of the flakes' luminance.
+    pub sparkle: f64,
+}
+
 /// How good a correspondence is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CorrespondenceReport {
@@ -48,6 +59,10 @@ pub struct CorrespondenceReport {
     /// What the correspondence of each pair of paints costs, and how far that is from the best for the pair alone.
     #[serde(default)]
     pub pairs: Vec<PairReport>,
+    /// What exact transport of the distance would have given at equal weights, at the instrument geometries; empty
+    /// where that is what was done, and before it was measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub against_exact: Vec<BlendDeviation>,
     /// Paints whose slices were mixed because their angles differ from the common grid's, by place in hash order.
     pub mixed: Vec<usize>,
     /// Paints without flakes, by place in hash order.
@@ -103,19 +118,21 @@ impl Grid<'_> {
     }
 }
 
-/// Corresponding clusters of paints in the order given, and how good they are.
+/// Corresponding clusters of paints in the order given, and how good they are; on their common angles, or on others.
 pub(super) fn correspond(
     paints: &[&CarPaint],
     settings: &BlendSettings,
+    on: Option<(AngleGrid, AngleGrid)>,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<(Option<BlendedFlakes>, CorrespondenceReport), BlendError> {
     let grids = paints
         .iter()
         .filter_map(|p| p.flakes.as_ref())
         .map(|f| (&f.theta_h, &f.theta_d));
-    let Some((theta_h, theta_d)) = common_grid(grids)? else {
+    let Some(common) = common_grid(grids)? else {
         return Ok((None, CorrespondenceReport::default()));
     };
+    let (theta_h, theta_d) = on.unwrap_or(common);
     let grid = Grid {
         theta_h: &theta_h,
         theta_d: &theta_d,

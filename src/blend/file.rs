@@ -7,8 +7,8 @@ use super::{
 };
 use crate::color::{Lab, LinearRgb};
 use crate::paint::{
-    AngleGrid, CarPaint, Coat, ColorTable, Container, ContainerError, FlakeTexture, Flakes, Limits,
-    Lobe, PaintError, Reader, Writer,
+    AngleGrid, CarPaint, Clustering, Coat, ColorTable, Container, ContainerError, FlakeTexture,
+    Flakes, Limits, Lobe, PaintError, Reader, Writer,
 };
 
 /// Latest version of the file that is read and the one that is written.
@@ -53,6 +53,8 @@ struct PaintHeader {
     diffuse: LinearRgb,
     lobes: Vec<Lobe>,
     chi_overall: Lab,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    clustering: Option<Clustering>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -230,6 +232,7 @@ impl PaintHeader {
             diffuse: paint.diffuse,
             lobes: paint.lobes.clone(),
             chi_overall: paint.color_table.overall(),
+            clustering: paint.clustering.clone(),
         }
     }
 
@@ -240,6 +243,7 @@ impl PaintHeader {
             coat,
             diffuse,
             lobes,
+            clustering,
             ..
         } = self;
         BlendedPaint {
@@ -249,6 +253,7 @@ impl PaintHeader {
             diffuse,
             lobes,
             color_table,
+            clustering,
         }
     }
 }

@@ -4,9 +4,10 @@
 //! cost(i, j) = Σ_k p_k w(c_k^i, c_k^j)  ≥  optimum(i, j)  ≥  dual bound(i, j)
 //! ```
 //!
-//! so that `gap = cost − dual bound` bounds the pair's excess, whoever found the correspondence. Of two paints it is the
-//! gap of the plans themselves, over all slices. Of more, the pairs are transported alone, exactly, on at most
-//! [`CHECKED`] slices spread evenly over the grid; the report says how many.
+//! in distances, Lab units, whatever cost the correspondence was found with, so that `gap = cost − dual bound` bounds the
+//! pair's excess and can be compared. Of two paints whose distance was minimised it is the gap of the plans themselves,
+//! over all slices. Otherwise pairs are transported alone, exactly, on at most [`CHECKED`] slices spread evenly over the
+//! grid; the report says how many.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -25,9 +26,9 @@ pub(super) const CHECKED: usize = 64;
 pub struct PairReport {
     /// The two paints, by place in hash order.
     pub paints: [usize; 2],
-    /// Mean cost of a slice over all slices: Lab units for the distance, their square otherwise.
+    /// Mean distance in Lab between corresponding clusters, over all slices.
     pub mean_cost: f64,
-    /// Mean excess over the dual bound of the pair alone, same unit, over the slices that were checked.
+    /// Mean excess over the dual bound of the pair alone, Lab units, over the slices that were checked.
     pub mean_gap: f64,
     /// Largest such excess.
     pub largest_gap: f64,
@@ -47,10 +48,10 @@ pub(super) fn pair_reports(
     let mut reports = Vec::new();
     for i in 0..order.len() {
         for j in i + 1..order.len() {
-            let costs = slices.iter().map(|s| s.cost_of_pair(i, j, settings.cost));
+            let costs = slices.iter().map(|s| s.cost_of_pair(i, j, Cost::Distance));
             #[allow(clippy::cast_precision_loss)] // a count of slices
             let mean_cost = costs.sum::<f64>() / count.max(1) as f64;
-            let gaps: Vec<f64> = if order.len() == 2 {
+            let gaps: Vec<f64> = if order.len() == 2 && settings.cost == Cost::Distance {
                 slices.iter().map(|s| s.gap).collect()
             } else {
                 let step = count.div_ceil(CHECKED).max(1);
@@ -58,9 +59,9 @@ pub(super) fn pair_reports(
                     .into_par_iter()
                     .step_by(step)
                     .map_init(Bench::default, |bench, k| {
-                        bound_alone([paints[i], paints[j]], grid.angles(k), settings.cost, bench)
+                        bound_alone([paints[i], paints[j]], grid.angles(k), bench)
                             .map(|bound| {
-                                let cost = slices[k].cost_of_pair(i, j, settings.cost);
+                                let cost = slices[k].cost_of_pair(i, j, Cost::Distance);
                                 (cost - bound).max(0.0)
                             })
                             .map_err(|source| grid.refused(k, source))
@@ -81,11 +82,10 @@ pub(super) fn pair_reports(
     Ok(reports)
 }
 
-/// Dual bound of the cost of transporting one paint's slice onto the other's.
+/// Dual bound of the distance of one paint's slice from the other's.
 fn bound_alone(
     pair: [&CarPaint; 2],
     (theta_h_deg, theta_d_deg): (f64, f64),
-    cost: Cost,
     bench: &mut Bench,
 ) -> Result<f64, crate::transport::TransportError> {
     let mut clouds = [Vec::new(), Vec::new()];
@@ -100,7 +100,12 @@ fn bound_alone(
     }
     let [source, target] = clouds;
     bench.problem.refill(source, target)?;
-    Method::Exact.solve_into(&bench.problem, cost, &mut bench.workspace, &mut bench.plan)?;
+    Method::Exact.solve_into(
+        &bench.problem,
+        Cost::Distance,
+        &mut bench.workspace,
+        &mut bench.plan,
+    )?;
     Ok(bench.plan.cost - bench.plan.gap)
 }
 

@@ -10,6 +10,7 @@ use super::ingest::ReadingArgs;
 use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
+use crate::accuracy::blend_error;
 use crate::workshop::{WorkshopError, blend_paints, open_paint};
 
 /// Find how the flakes of 2 to 5 paints become one another, and keep it as a .blend.
@@ -63,7 +64,8 @@ impl Blend {
         if json {
             let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
             return output::print_json(
-                &json!({ "out": self.out, "paints": names, "correspondence": report, "notes": made.notes }),
+                &json!({ "out": self.out, "paints": names, "profile": options.profile.name(), "correspondence": report,
+                    "error": blend_error(&made.blend), "notes": made.notes }),
             );
         }
         for note in &made.notes {
@@ -71,12 +73,13 @@ impl Blend {
         }
         let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
         eprintln!(
-            "{}: {} · {} slices, {} clusters, mean transport {:.2} Lab",
+            "{}: {} · {} slices, {} clusters, mean transport {:.2}, error {:.3} Lab",
             self.out.display(),
             names.join(" + "),
             report.slices,
             report.clusters,
-            report.mean_cost
+            report.mean_cost,
+            blend_error(&made.blend).lab
         );
         Ok(())
     }

@@ -40,8 +40,8 @@ pub use docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
-    Fault, Format, IngestOrder, Layout, PictureFormat, Progress, Scene, ThetaH, Thing, View,
-    WorkError, Works,
+    Fault, Format, IngestOrder, Layout, Picture, PictureFormat, Progress, Scene, ThetaH, Thing,
+    View, WorkError, Works,
 };
 pub use workshop::Workshop;
 

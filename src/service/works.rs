@@ -108,6 +108,15 @@ pub struct View {
     pub samples_per_pixel: u32,
 }
 
+/// A picture with the account of its accuracy.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// How accurate it is, as the value of a header: the same for the same picture.
+    pub accuracy: String,
+}
+
 /// Whose fault it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
@@ -181,7 +190,7 @@ pub trait Works: Debug + Send + Sync {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
-    ) -> Result<Vec<u8>, WorkError>;
+    ) -> Result<Picture, WorkError>;
 
     /// What is known about a paint or a blend.
     fn describe(&self, thing: &Thing) -> Value;

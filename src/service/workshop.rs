@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Fault, Format, IngestOrder, Layout, PictureFormat, Progress, Scene, ThetaH, Thing, View,
-    WorkError, Works,
+    Fault, Format, IngestOrder, Layout, Picture, PictureFormat, Progress, Scene, ThetaH, Thing,
+    View, WorkError, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
@@ -106,7 +106,7 @@ impl Works for Workshop {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
-    ) -> Result<Vec<u8>, WorkError> {
+    ) -> Result<Picture, WorkError> {
         let scene = match view.scene {
             Scene::Sphere => "sphere",
             Scene::Capsule => "capsule",
@@ -122,7 +122,20 @@ impl Works for Workshop {
             PictureFormat::Png => workshop::PictureFormat::Png,
             PictureFormat::Exr => workshop::PictureFormat::Exr,
         };
-        Ok(workshop::preview(thing, weights, &options, format, &self.limits, &|_| ())?.bytes)
+        let made = workshop::preview(thing, weights, &options, format, &self.limits, &|_| ())?;
+        let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
+        let mut accuracy = Vec::new();
+        for (name, path) in [
+            ("sampling-mean-de2000", "/rendering/sampling/mean_delta_e"),
+            ("sampling-p95-de2000", "/rendering/sampling/p95_delta_e"),
+            ("flakes-lab", "/error/lab"),
+        ] {
+            accuracy.extend(number(path).map(|value| format!("{name}={value:.4}")));
+        }
+        Ok(Picture {
+            bytes: made.bytes,
+            accuracy: accuracy.join(", "),
+        })
     }
 
     fn describe(&self, thing: &Thing) -> Value {

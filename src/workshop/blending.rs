@@ -1,7 +1,7 @@
 //! Blending paints: those with too many clusters are reduced first.
 
 use super::WorkshopError;
-use crate::accuracy::Profile;
+use crate::accuracy::{Profile, blend_deviation};
 use crate::blend::{Blend, BlendError, Ingredient};
 use crate::fit::{ClusterSettings, reduce_clusters};
 use crate::paint::{CarPaint, PaintFile};
@@ -45,6 +45,10 @@ pub fn blend_paints(
             }
             _ => WorkshopError::internal(error),
         })?;
+    let deviation =
+        blend_deviation(&ingredients, &profile.blend).map_err(WorkshopError::internal)?;
+    let clusterings: Vec<_> = paints.iter().map(|file| file.clustering.clone()).collect();
+    let blend = blend.with_accuracy(deviation, &clusterings);
     let by_hash: Vec<&str> = blend.paints.iter().map(|p| p.name.as_str()).collect();
     let report = blend.report();
     for &place in &report.mixed {

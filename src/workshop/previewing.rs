@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::realising::{Made, choose};
+use super::realising::{Made, choose, error_of};
 use super::{Thing, WorkshopError, read};
 use crate::blend::RealisationWeights;
 use crate::paint::{CarPaint, Limits};
@@ -95,7 +95,11 @@ pub fn preview(
         PictureFormat::Exr => rendering.film.to_exr(),
     }
     .map_err(WorkshopError::internal)?;
-    let report = json!({ "realisation": chosen.report, "rendering": rendering.report });
+    let report = json!({
+        "realisation": chosen.report,
+        "rendering": rendering.report,
+        "error": error_of(thing, weights),
+    });
     Ok(Made {
         bytes,
         report,

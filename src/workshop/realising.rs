@@ -5,9 +5,11 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::{Thing, WorkshopError};
-use crate::accuracy::Profile;
+use crate::accuracy::{
+    Profile, ResultError, blend_error, file_error, paint_error, sparkle, writing_error,
+};
 use crate::blend::{Blend, Clamp, RealisationWeights};
-use crate::export::{self, About};
+use crate::export::{self, About, ExportSettings};
 use crate::paint::{CarPaint, Clustering, PaintFile, Provenance, certify};
 
 /// What a realisation is written as.
@@ -151,7 +153,11 @@ pub fn realise(
             notes: Vec::new(),
         });
     }
-    let chosen = choose(thing, weights)?;
+    let mut chosen = choose(thing, weights)?;
+    if format != Format::Paint {
+        let error = error_of(thing, weights);
+        chosen.report["accuracy"] = accuracy(&error, &chosen.paint, &profile.export);
+    }
     let about = About {
         name: chosen.name.clone(),
         provenance: chosen.provenance.clone(),
@@ -175,6 +181,29 @@ pub fn realise(
         report: chosen.report,
         notes: chosen.notes,
     })
+}
+
+/// How far the file is from what the reference profile would have given, and its sparkle.
+fn accuracy(of: &ResultError, paint: &CarPaint, settings: &ExportSettings) -> Value {
+    let writing = writing_error(paint, settings);
+    json!({
+        "error": file_error(of, writing.as_ref()),
+        "writing": writing,
+        "sparkle": sparkle(paint),
+    })
+}
+
+/// Error of a thing at some weights, before anything is written of it.
+pub(super) fn error_of(thing: &Thing, weights: Option<&RealisationWeights>) -> ResultError {
+    match (thing, weights) {
+        (Thing::Paint(file), _) => paint_error(file),
+        (Thing::Blend(blend), None) => blend_error(blend),
+        (Thing::Blend(blend), Some(weights)) => {
+            let size = |weights: &[f64]| weights.iter().map(|w| w.abs()).sum::<f64>();
+            let color = size(weights.flake_color()) * weights.flake_saturation.abs();
+            blend_error(blend).stretched(size(weights.flake_lightness()).max(color))
+        }
+    }
 }
 
 /// A realised paint as a paint of its own.

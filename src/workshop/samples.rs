@@ -13,9 +13,9 @@ use std::ops::ControlFlow;
 
 use super::WorkshopError;
 use super::ingest::finish;
-use crate::accuracy::Profile;
-use crate::fit::{FlakeRecipe, simulate_flakes};
-use crate::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance};
+use crate::accuracy::{Profile, clustering_error};
+use crate::fit::{FlakeRecipe, SimulatedPatch, fit_flakes};
+use crate::paint::{CarPaint, Clustering, ColorTable, Lobe, PaintFile, Provenance};
 
 /// One sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -224,10 +224,14 @@ impl Sample {
                 progress(done as f32 / of as f32);
                 ControlFlow::Continue(())
             };
-            let fitted = simulate_flakes(&paint, &sparkle.recipe(), &profile.flakes, &tell)
-                .map_err(|e| WorkshopError::usage("clusters", e))?;
+            let refused = |e| WorkshopError::usage("clusters", e);
+            let patch = SimulatedPatch::new(&paint, &sparkle.recipe()).map_err(refused)?;
+            let fitted = fit_flakes(&patch, &profile.flakes, &tell).map_err(refused)?;
             paint.flakes = Some(fitted.flakes);
-            clustering = Some(fitted.clustering);
+            clustering = Some(Clustering {
+                error: clustering_error(&patch, &paint),
+                ..fitted.clustering
+            });
             warnings = fitted.warnings;
             warnings.push("the flakes are simulated, not measured".to_owned());
             provenance.simulated_flakes = true;

@@ -9,7 +9,7 @@ use carpaint::accuracy::Profile;
 use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
-    App, Fault, Format, IngestOrder, PictureFormat, Progress, ServiceConfig, Thing, View,
+    App, Fault, Format, IngestOrder, Picture, PictureFormat, Progress, ServiceConfig, Thing, View,
     WorkError, Works, open, serve,
 };
 use serde_json::{Value, json};
@@ -129,9 +129,12 @@ impl Works for Pretend {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
-    ) -> Result<Vec<u8>, WorkError> {
+    ) -> Result<Picture, WorkError> {
         let paint = self.realise(thing, weights, Format::Json, &Profile::default())?;
-        Ok([format!("{format:?} {view:?} ").into_bytes(), paint].concat())
+        Ok(Picture {
+            bytes: [format!("{format:?} {view:?} ").into_bytes(), paint].concat(),
+            accuracy: "sampling-mean-de2000=0.5".to_owned(),
+        })
     }
 
     fn describe(&self, thing: &Thing) -> Value {
