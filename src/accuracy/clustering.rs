@@ -4,12 +4,15 @@
 //! [`SPREAD`] spread evenly over the measured grid. A measured slice that was not fitted (every k-th angle) is compared
 //! with the mixture of its fitted neighbours, so that the price of fewer angles is in the same numbers.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use super::geometries::{Geometry, geometries, mixed, slices_at};
 use crate::color::{Lab, LinearRgb, ciede2000, luminance};
+use crate::fit::{ClusterSettings, Clusterer, SliceClusters, Thinned};
 use crate::measurement::{FlakePictures, SliceRoom};
-use crate::paint::{CarPaint, ClusteringError, Flakes, LightnessMixture, Percentiles};
+use crate::paint::{AngleGrid, CarPaint, ClusteringError, LightnessMixture, Percentiles, Slice};
 
 /// Slices compared besides those around the instrument geometries.
 const SPREAD: usize = 12;
@@ -34,6 +37,63 @@ struct Compared {
 #[must_use]
 pub fn clustering_error(pictures: &dyn FlakePictures, paint: &CarPaint) -> Option<ClusteringError> {
     let flakes = paint.flakes.as_ref()?;
+    let fitted = |k: usize| Some(flakes.slice_at(k));
+    Some(compared(
+        pictures,
+        paint,
+        [&flakes.theta_h, &flakes.theta_d],
+        &fitted,
+    ))
+}
+
+/// What [`clustering_error`] will be of a paint with this base whose flakes are fitted to these pictures: exactly, for the
+/// slices that are compared are fitted now, and no others.
+#[must_use]
+pub fn predicted_clustering_error(
+    pictures: &dyn FlakePictures,
+    base: &CarPaint,
+    settings: &ClusterSettings,
+) -> Option<ClusteringError> {
+    let thinned = Thinned::new(pictures, settings.angle_step);
+    let (rows, columns) = (thinned.theta_h(), thinned.theta_d());
+    let mut needed: Vec<usize> = slices_to_compare(pictures, &geometries(base))
+        .into_iter()
+        .flat_map(|k| {
+            let (h, d) = angles_of(pictures, k);
+            slices_at(rows, columns, h, d)
+        })
+        .map(|(_, k)| k)
+        .collect();
+    needed.sort_unstable();
+    needed.dedup();
+    let fitted: BTreeMap<usize, SliceClusters> = needed
+        .into_par_iter()
+        .map_init(<(SliceRoom, Clusterer)>::default, |(room, clusterer), k| {
+            thinned.read(k, room).ok()?;
+            let planes = room.picture.planes.each_ref().map(Vec::as_slice);
+            Some((k, clusterer.cluster(planes, settings).ok()?))
+        })
+        .flatten_iter()
+        .collect();
+    let slice = |k: usize| {
+        fitted.get(&k).map(|clusters| Slice {
+            probability: &clusters.probability,
+            lower: &clusters.lower,
+            upper: &clusters.upper,
+        })
+    };
+    Some(compared(pictures, base, [rows, columns], &slice))
+}
+
+/// The slices of a fit, by number.
+type Fitted<'a> = dyn Fn(usize) -> Option<Slice<'a>> + Sync + 'a;
+
+fn compared<'a>(
+    pictures: &dyn FlakePictures,
+    paint: &CarPaint,
+    grid: [&AngleGrid; 2],
+    fitted: &Fitted<'a>,
+) -> ClusteringError {
     let seen = geometries(paint);
     let slices = slices_to_compare(pictures, &seen);
     let compared: Vec<Compared> = slices
@@ -41,7 +101,7 @@ pub fn clustering_error(pictures: &dyn FlakePictures, paint: &CarPaint) -> Optio
         .map_init(SliceRoom::default, |room, k| {
             // A picture between the fitted angles may be damaged: it was not asked for.
             pictures.read(k, room).ok()?;
-            compare(pictures, k, room, flakes)
+            compare(pictures, k, room, grid, fitted)
         })
         .flatten_iter()
         .collect();
@@ -62,14 +122,23 @@ pub fn clustering_error(pictures: &dyn FlakePictures, paint: &CarPaint) -> Optio
             geometry.lab(mean(&|c| c.clusters)),
         );
     }
-    Some(ClusteringError {
+    ClusteringError {
         slices: compared.len(),
         of: pictures.slices(),
         lightness_w1: of(&|c| Some(c.lightness_w1)),
         mean_luminance: of(&|c| c.relative.map(|r| r[0])),
         sparkle: of(&|c| c.relative.map(|r| r[1])),
         instrument,
-    })
+    }
+}
+
+/// θh and θd of a picture, degrees.
+fn angles_of(pictures: &dyn FlakePictures, slice: usize) -> (f64, f64) {
+    let columns = pictures.theta_d().len();
+    (
+        pictures.theta_h().degrees()[slice / columns],
+        pictures.theta_d().degrees()[slice % columns],
+    )
 }
 
 fn slices_to_compare(pictures: &dyn FlakePictures, seen: &[Geometry]) -> Vec<usize> {
@@ -89,11 +158,12 @@ fn slices_to_compare(pictures: &dyn FlakePictures, seen: &[Geometry]) -> Vec<usi
     slices
 }
 
-fn compare(
+fn compare<'a>(
     pictures: &dyn FlakePictures,
     slice: usize,
     room: &SliceRoom,
-    flakes: &Flakes,
+    [theta_h, theta_d]: [&AngleGrid; 2],
+    fitted: &Fitted<'a>,
 ) -> Option<Compared> {
     let [red, green, blue] = room.picture.planes.each_ref();
     let (mut lightness, mut sum) = (Vec::with_capacity(red.len()), [0.0; 3]);
@@ -111,14 +181,11 @@ fn compare(
     #[allow(clippy::cast_precision_loss)] // a count of pixels
     let pixels = sum.map(|s| s / lightness.len() as f64);
 
-    let columns = pictures.theta_d().len();
-    let met = slices_at(
-        &flakes.theta_h,
-        &flakes.theta_d,
-        pictures.theta_h().degrees()[slice / columns],
-        pictures.theta_d().degrees()[slice % columns],
-    );
-    let parts: Vec<_> = met.iter().map(|&(w, k)| (w, flakes.slice_at(k))).collect();
+    let (h, d) = angles_of(pictures, slice);
+    let parts = slices_at(theta_h, theta_d, h, d)
+        .into_iter()
+        .map(|(weight, k)| Some((weight, fitted(k)?)))
+        .collect::<Option<Vec<_>>>()?;
     let clusters = mixed(parts.iter().map(|(weight, slice)| (*weight, slice.mean())));
     let mixture = LightnessMixture::of(&parts);
     let mean = std::f64::consts::PI * luminance(pixels);
@@ -200,7 +267,9 @@ mod tests {
         let patch = SimulatedPatch::new(&paint, &recipe).expect("in range");
         let fitted = fit_flakes(&patch, settings, &|_, _| ControlFlow::Continue(())).expect("fits");
         paint.flakes = Some(fitted.flakes);
+        let predicted = predicted_clustering_error(&patch, &paint, settings);
         let error = clustering_error(&patch, &paint).expect("flakes");
+        assert_eq!(predicted.as_ref(), Some(&error), "what is predicted comes");
         let bound = fitted.clustering.w1_bound.expect("bounded");
         if settings.angle_step == 1 {
             assert!(

@@ -13,7 +13,7 @@ mod profile;
 mod sparkle;
 mod writing;
 
-pub use clustering::clustering_error;
+pub use clustering::{clustering_error, predicted_clustering_error};
 pub use correspondence::blend_deviation;
 pub use error::{ResultError, Term, blend_error, file_error, paint_error};
 pub use knobs::{CostKnob, Draw, Knobs, Preset, ProfileError, Transport};

@@ -19,6 +19,7 @@ mod mixture;
 mod order;
 mod pairs;
 mod realise;
+mod thinned;
 mod weights;
 
 pub use clamp::Clamp;

@@ -16,9 +16,15 @@ impl<'a> Thinned<'a> {
     /// Every `step`-th angle of these pictures.
     #[must_use]
     pub fn new(pictures: &'a dyn FlakePictures, step: usize) -> Self {
+        Self::by_steps(pictures, [step; 2])
+    }
+
+    /// Every so many-th angle of θh and of θd.
+    #[must_use]
+    pub fn by_steps(pictures: &'a dyn FlakePictures, [step_h, step_d]: [usize; 2]) -> Self {
         let (rows, columns) = (
-            pictures.theta_h().every(step),
-            pictures.theta_d().every(step),
+            pictures.theta_h().every(step_h),
+            pictures.theta_d().every(step_d),
         );
         Self {
             theta_h: pictures.theta_h().at(&rows),

@@ -114,12 +114,23 @@ pub fn render(
         .collect();
     let film = Film::new(width, height, scene.exposure, rows.concat());
     let report = RenderReport {
-        sampling: noise::sampling_error(&shader, scene, &film),
+        sampling: noise::sampling_error(&shader, scene, Some(&film)),
         plan,
         samples_per_pixel: scene.samples_per_pixel,
         pixel_mm: pixel_mm(scene),
     };
     Ok(Rendering { film, report })
+}
+
+/// What the samples of a picture will leave to chance, without drawing it: only the pixels that tell are drawn.
+///
+/// # Errors
+///
+/// [`RenderError::Scene`] for a scene that is out of range.
+pub fn sampling(paint: &CarPaint, scene: &Scene) -> Result<SamplingError, RenderError> {
+    scene.validate(&Limits::default())?;
+    let (shader, _) = shade::Shader::new(paint, scene);
+    Ok(noise::sampling_error(&shader, scene, None))
 }
 
 fn pixel_mm(scene: &Scene) -> f64 {

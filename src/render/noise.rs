@@ -35,8 +35,12 @@ pub struct SamplingError {
     pub p95_delta_e: f64,
 }
 
-/// Draws some pixels again.
-pub(super) fn sampling_error(shader: &Shader<'_>, scene: &Scene, film: &Film) -> SamplingError {
+/// Draws some pixels again; where there is no picture yet, twice.
+pub(super) fn sampling_error(
+    shader: &Shader<'_>,
+    scene: &Scene,
+    film: Option<&Film>,
+) -> SamplingError {
     let [width, height] = scene.size;
     let mut stride = LEAST_STRIDE;
     while width.div_ceil(stride) * height.div_ceil(stride) > PROBED {
@@ -50,7 +54,10 @@ pub(super) fn sampling_error(shader: &Shader<'_>, scene: &Scene, film: &Film) ->
         .par_iter()
         .map(|&(x, y)| {
             let again = shader.pixel(x, y, scene.seed.wrapping_add(OTHER));
-            let first = film.pixels()[(y * width + x) as usize];
+            let first = film.map_or_else(
+                || shader.pixel(x, y, scene.seed),
+                |film| film.pixels()[(y * width + x) as usize],
+            );
             ciede2000(shown(first, scene.exposure), shown(again, scene.exposure))
                 / std::f64::consts::SQRT_2
         })

@@ -6,6 +6,7 @@
 mod blending;
 mod describing;
 mod error;
+mod estimate;
 mod evaluating;
 mod ingest;
 mod previewing;
@@ -16,6 +17,10 @@ mod thing;
 pub use blending::{Blended, blend_paints};
 pub use describing::{describe_blend, describe_paint};
 pub use error::{Fault, WorkshopError};
+pub use estimate::{
+    Estimate, EstimatedError, Stage, estimate_blend, estimate_blend_of, estimate_ingest, estimate_preview,
+    estimate_realise,
+};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{IngestOptions, Measurement, ingest, ingest_upload, open_measurement};
 pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};

@@ -8,7 +8,7 @@ use super::realising::{Made, choose, error_of};
 use super::{Thing, WorkshopError, read};
 use crate::blend::RealisationWeights;
 use crate::paint::{CarPaint, Limits};
-use crate::render::{self, Environment, RenderError, Scene, Shape};
+use crate::render::{self, Environment, RenderError, SamplingError, Scene, Shape};
 
 /// What a picture shows.
 #[derive(Clone, Debug)]
@@ -73,21 +73,7 @@ pub fn preview(
     limits: &Limits,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Made, WorkshopError> {
-    let shape: Shape = serde_json::from_value(json!(options.scene)).map_err(|_| {
-        WorkshopError::usage(
-            "scene",
-            format!(
-                "there is no scene '{}'; there are sphere, capsule and panel",
-                options.scene
-            ),
-        )
-    })?;
-    let mut scene = Scene::new(shape, options.size);
-    scene.samples_per_pixel = options.samples_per_pixel;
-    if let Some(environment) = &options.environment {
-        scene = scene.in_environment(environment.clone());
-    }
-    scene.validate(limits).map_err(refused)?;
+    let scene = scene_of(options, limits)?;
     let chosen = choose(thing, weights)?;
     let rendering = render::render(&chosen.paint, &scene, progress).map_err(refused)?;
     let bytes = match format {
@@ -105,6 +91,37 @@ pub fn preview(
         report,
         notes: chosen.notes,
     })
+}
+
+/// What the samples of a picture will leave to chance.
+pub(super) fn sampling(
+    thing: &Thing,
+    weights: Option<&RealisationWeights>,
+    options: &PreviewOptions,
+    limits: &Limits,
+) -> Result<SamplingError, WorkshopError> {
+    let scene = scene_of(options, limits)?;
+    let chosen = choose(thing, weights)?;
+    render::sampling(&chosen.paint, &scene).map_err(refused)
+}
+
+fn scene_of(options: &PreviewOptions, limits: &Limits) -> Result<Scene, WorkshopError> {
+    let shape: Shape = serde_json::from_value(json!(options.scene)).map_err(|_| {
+        WorkshopError::usage(
+            "scene",
+            format!(
+                "there is no scene '{}'; there are sphere, capsule and panel",
+                options.scene
+            ),
+        )
+    })?;
+    let mut scene = Scene::new(shape, options.size);
+    scene.samples_per_pixel = options.samples_per_pixel;
+    if let Some(environment) = &options.environment {
+        scene = scene.in_environment(environment.clone());
+    }
+    scene.validate(limits).map_err(refused)?;
+    Ok(scene)
 }
 
 fn refused(error: RenderError) -> WorkshopError {

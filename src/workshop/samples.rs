@@ -177,6 +177,18 @@ impl Sample {
         self.flakes.is_some()
     }
 
+    /// The patch of flakes that is simulated for it; `None` for a solid color.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkshopError`] never: the recipes are in range.
+    pub fn patch(&self) -> Result<Option<SimulatedPatch>, WorkshopError> {
+        self.flakes
+            .map(|sparkle| SimulatedPatch::new(&self.base(), &sparkle.recipe()))
+            .transpose()
+            .map_err(WorkshopError::internal)
+    }
+
     /// The base as the paper fitted it, without flakes.
     #[must_use]
     pub fn base(&self) -> CarPaint {
@@ -218,14 +230,13 @@ impl Sample {
             "Günther et al., VMV 2005, table of fits".to_owned(),
         );
         let (mut clustering, mut warnings) = (None, Vec::new());
-        if let Some(sparkle) = self.flakes {
+        if let Some(patch) = self.patch()? {
             let tell = |done: usize, of: usize| {
                 #[allow(clippy::cast_precision_loss)] // a progress bar
                 progress(done as f32 / of as f32);
                 ControlFlow::Continue(())
             };
             let refused = |e| WorkshopError::usage("clusters", e);
-            let patch = SimulatedPatch::new(&paint, &sparkle.recipe()).map_err(refused)?;
             let fitted = fit_flakes(&patch, &profile.flakes, &tell).map_err(refused)?;
             paint.flakes = Some(fitted.flakes);
             clustering = Some(Clustering {
