@@ -125,7 +125,7 @@ impl BakedSlice {
         let (row, theta_h_deg) = nearest(&flakes.theta_h, half.map(|h| h.theta_h));
         let (column, theta_d_deg) = nearest(&flakes.theta_d, half.map(|h| h.theta_d));
         Self {
-            flakes: flakes.only(row, column),
+            flakes: flakes.only(&[row], &[column]),
             theta_h_deg,
             theta_d_deg,
         }

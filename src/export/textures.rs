@@ -495,13 +495,13 @@ fn rounding(half: &[f16], exact: &[f32]) -> f32 {
 }
 
 /// The range of all corners, in 255 steps an axis.
-struct Range8 {
-    scale: [f32; 3],
-    offset: [f32; 3],
+pub(super) struct Range8 {
+    pub(super) scale: [f32; 3],
+    pub(super) offset: [f32; 3],
 }
 
 impl Range8 {
-    fn of(flakes: &Flakes) -> Self {
+    pub(super) fn of(flakes: &Flakes) -> Self {
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];
         for corner in flakes.lower.iter().chain(&flakes.upper) {

@@ -78,3 +78,20 @@ pub(super) fn of_moments(mean: [f64; 3], variance: [f64; 3], light: LinearRgb) -
     };
     (corner(-1.0), corner(1.0))
 }
+
+/// Root of the mean squared distance between members and independent colors of their box, Lab units.
+pub(super) fn reach(members: &[Texel], lower: [f32; 3], upper: [f32; 3]) -> f64 {
+    let mut squared = 0.0_f64;
+    for k in 0..3 {
+        let (center, half) = (
+            f32::midpoint(lower[k], upper[k]),
+            f64::from(upper[k] - lower[k]) / 2.0,
+        );
+        let sum: f32 = members
+            .iter()
+            .map(|texel| (texel[k] - center) * (texel[k] - center))
+            .sum();
+        squared += f64::from(sum) / members.len() as f64 + half * half / 3.0;
+    }
+    squared.sqrt()
+}

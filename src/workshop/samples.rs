@@ -13,10 +13,10 @@ use std::ops::ControlFlow;
 
 use super::WorkshopError;
 use super::ingest::finish;
-use crate::accuracy::Profile;
+use crate::accuracy::{Profile, clustering_error};
 use crate::color::luminance;
-use crate::fit::{FlakeRecipe, simulate_flakes};
-use crate::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance};
+use crate::fit::{FlakeRecipe, SimulatedPatch, fit_flakes};
+use crate::paint::{CarPaint, Clustering, ColorTable, Lobe, PaintFile, Provenance};
 
 /// One sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -183,6 +183,21 @@ impl Sample {
         self.flakes.is_some()
     }
 
+    /// The patch of flakes that is simulated for it; `None` for a solid color.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkshopError`] never: the recipes are in range.
+    pub fn patch(&self) -> Result<Option<SimulatedPatch>, WorkshopError> {
+        self.flakes
+            .map(|sparkle| {
+                let base = self.base();
+                SimulatedPatch::new(&base, &sparkle.recipe(&base))
+            })
+            .transpose()
+            .map_err(WorkshopError::internal)
+    }
+
     /// The base as the paper fitted it, without flakes.
     #[must_use]
     pub fn base(&self) -> CarPaint {
@@ -224,16 +239,19 @@ impl Sample {
             "Günther et al., VMV 2005, table of fits".to_owned(),
         );
         let (mut clustering, mut warnings) = (None, Vec::new());
-        if let Some(sparkle) = self.flakes {
+        if let Some(patch) = self.patch()? {
             let tell = |done: usize, of: usize| {
                 #[allow(clippy::cast_precision_loss)] // a progress bar
                 progress(done as f32 / of as f32);
                 ControlFlow::Continue(())
             };
-            let fitted = simulate_flakes(&paint, &sparkle.recipe(&paint), &profile.flakes, &tell)
-                .map_err(|e| WorkshopError::usage("clusters", e))?;
+            let refused = |e| WorkshopError::usage("clusters", e);
+            let fitted = fit_flakes(&patch, &profile.flakes, &tell).map_err(refused)?;
             paint.flakes = Some(fitted.flakes);
-            clustering = Some(fitted.clustering);
+            clustering = Some(Clustering {
+                error: clustering_error(&patch, &paint),
+                ..fitted.clustering
+            });
             warnings = fitted.warnings;
             warnings.push("the flakes are simulated, not measured".to_owned());
             provenance.simulated_flakes = true;
