@@ -7,8 +7,8 @@ use super::{
 };
 use crate::color::{Lab, LinearRgb};
 use crate::paint::{
-    AngleGrid, CarPaint, Coat, ColorTable, Container, ContainerError, FlakeTexture, Flakes, Limits,
-    Lobe, PaintError, Reader, Writer,
+    AngleGrid, CarPaint, Clustering, Coat, ColorTable, Container, ContainerError, FlakeTexture,
+    Flakes, Limits, Lobe, PaintError, Reader, Writer,
 };
 
 /// Latest version of the file that is read and the one that is written.
@@ -55,6 +55,8 @@ struct PaintHeader {
     chi_overall: Lab,
     #[serde(default, skip_serializing_if = "Origin::is_plain")]
     origin: Origin,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    clustering: Option<Clustering>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -233,6 +235,7 @@ impl PaintHeader {
             lobes: paint.lobes.clone(),
             chi_overall: paint.color_table.overall(),
             origin: paint.origin,
+            clustering: paint.clustering.clone(),
         }
     }
 
@@ -244,6 +247,7 @@ impl PaintHeader {
             diffuse,
             lobes,
             origin,
+            clustering,
             ..
         } = self;
         BlendedPaint {
@@ -254,6 +258,7 @@ impl PaintHeader {
             lobes,
             color_table,
             origin,
+            clustering,
         }
     }
 }

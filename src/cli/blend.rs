@@ -10,6 +10,7 @@ use super::ingest::ReadingArgs;
 use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
+use crate::accuracy::blend_error;
 use crate::blend::PAINTS;
 use crate::workshop::{WorkshopError, blend_paints, describe_blend, open_paint};
 
@@ -73,7 +74,8 @@ impl Blend {
         if json {
             let correspondence = &describe_blend(&made.blend)["correspondence"];
             return output::print_json(
-                &json!({ "out": self.out, "paints": names, "correspondence": correspondence, "notes": made.notes }),
+                &json!({ "out": self.out, "paints": names, "profile": options.profile.name(),
+                    "correspondence": correspondence, "error": blend_error(&made.blend), "notes": made.notes }),
             );
         }
         for note in &made.notes {
@@ -81,12 +83,13 @@ impl Blend {
         }
         let report = made.blend.report();
         eprintln!(
-            "{}: {} · {} slices, {} clusters, mean transport {:.2} Lab",
+            "{}: {} · {} slices, {} clusters, mean transport {:.2}, error {:.3} Lab",
             self.out.display(),
             names.join(" + "),
             report.slices,
             report.clusters,
-            report.mean_cost
+            report.mean_cost,
+            blend_error(&made.blend).lab
         );
         Ok(())
     }

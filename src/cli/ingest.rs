@@ -95,7 +95,7 @@ impl ReadingArgs {
                 header_bytes: self.header_bytes,
             },
             coat_ior: self.coat_ior,
-            clusters: profile.clusters,
+            clusters: profile.asked_clusters()?,
             profile: profile.profile()?,
             ..IngestOptions::default()
         })

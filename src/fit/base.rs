@@ -136,11 +136,11 @@ pub fn fit_base_telling(
     };
     // Inside a coat light never leaves the cone of total reflection.
     let cone = match frame {
-        Frame::Inside(ior) if ior > 1.0 => (1.0 / ior).asin().to_degrees() + 5.0,
+        Frame::Inside(ior) if ior > 1.0 => ((1.0 / ior).asin().to_degrees() + 5.0).min(TRUSTED_DEG),
         _ => TRUSTED_DEG,
     };
     progress(0.0);
-    let samples = measure(measured, SAMPLES, cone.min(TRUSTED_DEG), 0xBA5E);
+    let samples = measure(measured, SAMPLES, cone, 0xBA5E);
     if samples.len() < LEAST_SAMPLES {
         return Err(FitError::TooFewSamples {
             found: samples.len(),
@@ -153,7 +153,7 @@ pub fn fit_base_telling(
     }
     let unit = unit_of(&samples);
     progress(0.02);
-    let judge = Judge::new(measured, frame, unit);
+    let judge = Judge::new(measured, frame, cone, unit);
     let floors = judge.floor_errors();
     let mut candidates: Vec<Candidate> = Vec::new();
     #[allow(clippy::cast_precision_loss)] // a progress bar

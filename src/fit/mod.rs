@@ -26,6 +26,7 @@ mod residual;
 mod simulate;
 mod steps;
 mod texels;
+mod thinned;
 
 pub use base::{CoatChoice, FitError, FittedBase, fit_base, fit_base_telling};
 pub use boxes::BoxRule;
@@ -33,4 +34,5 @@ pub use clusters::{ClusterSettings, Clusterer, NoTexel, SliceClusters};
 pub use flakes::{FittedFlakes, FlakeFitError, Progress, fit_flakes};
 pub use readings::against_readings;
 pub use reduce::reduce_clusters;
-pub use simulate::{FlakeRecipe, simulate_flakes};
+pub use simulate::{FlakeRecipe, SimulatedPatch, simulate_flakes};
+pub use thinned::Thinned;

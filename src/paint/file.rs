@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::container::{Container, ContainerError, Writer};
 use super::energy::EnergyCertificate;
 use super::{
-    AngleGrid, CarPaint, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes, Limits, Lobe,
-    PaintError, ReadingResiduals, Realisation,
+    AngleGrid, CarPaint, ClusteringError, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes,
+    Limits, Lobe, PaintError, Percentiles, ReadingResiduals, Realisation,
 };
 use crate::color::{Lab, LinearRgb};
 
@@ -41,9 +41,25 @@ pub struct Clustering {
     pub clusters: usize,
     /// Rule that boxes follow: `tight` or `moments`.
     pub box_rule: String,
-    /// Median and worst distance W1 between a slice's pixels and its clusters, in Lab, where it was measured.
+    /// Of the measured angles every so many-th was fitted, on either grid.
+    #[serde(default = "every_angle", skip_serializing_if = "is_every_angle")]
+    pub angle_step: usize,
+    /// Distance W1 in Lab between a slice's pixels and its clusters, bounded from above over all fitted slices: what
+    /// moving every pixel to a color of its own cluster's box would cost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub w1: Option<[f64; 2]>,
+    pub w1_bound: Option<Percentiles>,
+    /// How far the clusters are from the pixels, where it was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<ClusteringError>,
+}
+
+fn every_angle() -> usize {
+    1
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+fn is_every_angle(step: &usize) -> bool {
+    *step == 1
 }
 
 /// A paint and what is known about it.

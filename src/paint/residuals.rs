@@ -66,3 +66,58 @@ pub struct InstrumentError {
     /// CIEDE2000 of the floor.
     pub floor: f64,
 }
+
+/// How far the clusters of a paint's flakes are from the pixels they were made of.
+///
+/// Compared on slices that were read again: those around the six instrument geometries, and some spread evenly over
+/// the measured grid. A measured slice that was not fitted is compared with the mixture of its fitted neighbours.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClusteringError {
+    /// Slices that were compared.
+    pub slices: usize,
+    /// Slices that were measured.
+    pub of: usize,
+    /// Distance W1 of the lightnesses, Lab units, exact; what W1 in all three axes is at least.
+    pub lightness_w1: Percentiles,
+    /// Relative error of the mean luminance, over the lit slices among them.
+    pub mean_luminance: Percentiles,
+    /// Relative error of the 99.9th percentile of luminance, over the lit slices among them.
+    pub sparkle: Percentiles,
+    /// CIEDE2000 at the six instrument geometries between the means of clusters and pixels, base included.
+    pub instrument: [f64; 6],
+}
+
+/// A list of errors in three numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Percentiles {
+    /// Half of them are no larger.
+    pub median: f64,
+    /// Nine of ten are no larger.
+    pub p90: f64,
+    /// None is larger.
+    pub worst: f64,
+}
+
+impl Percentiles {
+    /// Of these values; all 0 where there is none.
+    #[must_use]
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            #[allow(
+                clippy::cast_precision_loss,
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss
+            )] // ranks in a list
+            let rank = (share * (values.len().max(1) - 1) as f64).round() as usize;
+            values.get(rank).copied().unwrap_or(0.0)
+        };
+        Self {
+            median: at(0.5),
+            p90: at(0.9),
+            worst: at(1.0),
+        }
+    }
+}

@@ -1,9 +1,9 @@
 //! Blending paints: those with too many clusters are reduced first.
 
 use super::WorkshopError;
-use crate::accuracy::Profile;
+use crate::accuracy::{Profile, blend_deviation};
 use crate::blend::{Blend, BlendError, Ingredient, Origin, Reduction};
-use crate::fit::reduce_clusters;
+use crate::fit::{ClusterSettings, reduce_clusters};
 use crate::paint::{CarPaint, Flakes, PaintFile};
 use crate::transport::TransportError;
 
@@ -29,7 +29,7 @@ pub fn blend_paints(
     let mut notes = Vec::new();
     let reduced: Vec<Option<CarPaint>> = paints
         .iter()
-        .map(|file| reduced(file, profile.flakes.clusters, &mut notes))
+        .map(|file| reduced(file, &profile.flakes, &mut notes))
         .collect();
     let ingredients: Vec<Ingredient<'_>> = paints
         .iter()
@@ -60,7 +60,12 @@ pub fn blend_paints(
             to: widest(fewer),
         }),
     });
-    let blend = blend.with_origins(origins);
+    let deviation =
+        blend_deviation(&ingredients, &profile.blend).map_err(WorkshopError::internal)?;
+    let clusterings: Vec<_> = paints.iter().map(|file| file.clustering.clone()).collect();
+    let blend = blend
+        .with_origins(origins)
+        .with_accuracy(deviation, &clusterings);
     let report = blend.report();
     let named = |place: usize| {
         let asked = blend.asked_at(place).and_then(|k| paints.get(k));
@@ -85,20 +90,39 @@ fn widest(paint: &CarPaint) -> usize {
     paint.flakes.as_ref().map_or(0, Flakes::widest_slice)
 }
 
-/// The paint with at most `most` clusters a slice, if it came from a blend and has more.
-fn reduced(file: &PaintFile, most: usize, notes: &mut Vec<String>) -> Option<CarPaint> {
-    let flakes = file
-        .paint
-        .flakes
-        .as_ref()
-        .filter(|f| file.provenance.source == "blend" && f.widest_slice() > most)?;
-    notes.push(format!(
-        "{}: up to {} clusters a slice were reduced to {most}",
-        file.name,
-        flakes.widest_slice()
-    ));
-    Some(CarPaint {
-        flakes: Some(reduce_clusters(flakes, most)),
+/// The paint as the profile wants it: with fewer angles if it was fitted at more, and, if it came from a blend and has
+/// more clusters, with fewer of those.
+fn reduced(
+    file: &PaintFile,
+    wanted: &ClusterSettings,
+    notes: &mut Vec<String>,
+) -> Option<CarPaint> {
+    let flakes = file.paint.flakes.as_ref()?;
+    let had = file.clustering.as_ref().map_or(1, |c| c.angle_step);
+    let thinned = (wanted.angle_step / had.max(1) > 1).then(|| {
+        let thinned = flakes.thinned(wanted.angle_step / had);
+        notes.push(format!(
+            "{}: {} of {} flake slices were used, every {}th angle",
+            file.name,
+            thinned.slices(),
+            flakes.slices(),
+            wanted.angle_step
+        ));
+        thinned
+    });
+    let flakes = thinned.as_ref().unwrap_or(flakes);
+    let fewer = (file.provenance.source == "blend" && flakes.widest_slice() > wanted.clusters)
+        .then(|| {
+            notes.push(format!(
+                "{}: up to {} clusters a slice were reduced to {}",
+                file.name,
+                flakes.widest_slice(),
+                wanted.clusters
+            ));
+            reduce_clusters(flakes, wanted.clusters)
+        });
+    fewer.or(thinned).map(|flakes| CarPaint {
+        flakes: Some(flakes),
         ..file.paint.clone()
     })
 }

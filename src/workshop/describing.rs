@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use crate::accuracy::{blend_error, paint_error, sparkle};
 use crate::blend::Blend;
 use crate::paint::{ASPECULAR_DEG, Chi, PaintFile, Reflectance, instrument_pairs};
 
@@ -43,7 +44,9 @@ pub fn describe_paint(file: &PaintFile) -> Value {
             "lifetime_deg": flakes.texture.lifetime_deg,
             "persistence_deg": flakes.texture.persistence_deg,
             "clustering": file.clustering,
+            "sparkle": sparkle(paint),
         })),
+        "error": paint_error(file),
         "readings": { "illuminant": "D65", "observer": "2", "illumination_deg": 45, "rows": readings },
         "residuals": file.residuals,
         "multi_angle": file.readings,
@@ -97,6 +100,7 @@ pub fn describe_blend(blend: &Blend) -> Value {
         "weights": format!("{} numbers, in this order", blend.len()),
         "settings": blend.settings(),
         "correspondence": describe_correspondence(blend),
+        "error": blend_error(blend),
         "flakes": blend.flakes.as_ref().map(|f| json!({
             "theta_h_deg": f.theta_h.degrees(),
             "theta_d_deg": f.theta_d.degrees(),

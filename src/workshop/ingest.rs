@@ -6,7 +6,7 @@ use std::path::Path;
 use super::content::content_hash;
 use super::thing::first_bytes;
 use super::{WorkshopError, read};
-use crate::accuracy::Profile;
+use crate::accuracy::{Profile, clustering_error};
 use crate::fit::{CoatChoice, FittedBase, against_readings, fit_base_telling, fit_flakes};
 use crate::measurement::{
     BrdfMeasurement, HalfAngleTable, Layout, Package, PackageBase, ReadOptions, TableLayout,
@@ -302,8 +302,11 @@ fn ingest_package(
         let fitted =
             fit_flakes(pictures, &options.profile.flakes, &tell).map_err(|e| e.to_string())?;
         warnings.extend(fitted.warnings);
-        clustering = Some(fitted.clustering);
         paint.flakes = Some(fitted.flakes);
+        clustering = Some(Clustering {
+            error: clustering_error(pictures, &paint),
+            ..fitted.clustering
+        });
     }
     let provenance = Provenance {
         source: Layout::Package.name().to_owned(),

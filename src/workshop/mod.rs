@@ -7,6 +7,7 @@ mod blending;
 mod content;
 mod describing;
 mod error;
+mod estimate;
 mod evaluating;
 mod ingest;
 mod previewing;
@@ -17,6 +18,10 @@ mod thing;
 pub use blending::{Blended, blend_paints};
 pub use describing::{describe_blend, describe_paint};
 pub use error::{Fault, WorkshopError};
+pub use estimate::{
+    Estimate, EstimatedError, Stage, estimate_blend, estimate_blend_of, estimate_ingest,
+    estimate_preview, estimate_realise,
+};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{
     BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, ingest, ingest_upload,
