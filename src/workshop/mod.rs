@@ -11,6 +11,7 @@ mod ingest;
 mod previewing;
 mod realising;
 mod samples;
+mod selftest;
 mod thing;
 
 pub use blending::{Blended, blend_paints};
@@ -21,4 +22,5 @@ pub use ingest::{IngestOptions, Measurement, ingest, ingest_upload, open_measure
 pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
+pub use selftest::{Check, selftest};
 pub use thing::{Source, Thing, find, open, open_paint, read};
