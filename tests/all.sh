@@ -15,6 +15,18 @@ if [ ! -d "$CARPAINT_DATA" ]; then
   echo "note: $CARPAINT_DATA is not there; tests on real measurements will skip and say so"
 fi
 
+# Slices of another generator are made by a Python with NumPy: CARPAINT_PYTHON, else one of our own beside the builds.
+if [ -f "$CARPAINT_DATA/peers/ot/gen.py" ] && [ -z "${CARPAINT_PYTHON:-}" ]; then
+  if python3 -c 'import numpy' 2>/dev/null; then
+    CARPAINT_PYTHON=python3
+  else
+    [ -x target/python/bin/python ] || python3 -m venv target/python
+    target/python/bin/pip install --quiet numpy
+    CARPAINT_PYTHON="$PWD/target/python/bin/python"
+  fi
+  export CARPAINT_PYTHON
+fi
+
 echo "== Rust: unit, property, oracle, stability and end-to-end tests"
 cargo test --quiet
 

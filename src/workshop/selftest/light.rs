@@ -17,7 +17,12 @@ fn pairs() -> Vec<(Direction, Direction)> {
         .flat_map(|&z| turns.iter().map(move |&turn| at(z, turn)))
         .collect();
     let mut random = Stream(1);
-    let mut any = || at(random.within(0.01, 1.0), random.within(0.0, 6.28));
+    let mut any = || {
+        at(
+            random.within(0.01, 1.0),
+            random.within(0.0, std::f64::consts::TAU),
+        )
+    };
     let easy: Vec<(Direction, Direction)> = (0..2000).map(|_| (any(), any())).collect();
     let crossed = hard
         .iter()

@@ -193,7 +193,7 @@ pub(super) fn far_weights(subject: &Subject<'_>) -> Vec<Check> {
     let blend = blend(subject.paint, subject.partner);
     let wrong = far.into_iter().filter(|weights| {
         let paint = blend.as_ref().and_then(|b| at(b, *weights));
-        !paint.is_some_and(|p| p.validate(&Limits::default()).is_ok())
+        paint.is_none_or(|p| p.validate(&Limits::default()).is_err())
     });
     let wrong = wrong.count();
     let nan = blend.and_then(|b| at(&b, [f64::NAN, 1.0])).is_some();
