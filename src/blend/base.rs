@@ -34,40 +34,47 @@ pub(super) fn common_grid<'a>(
     }
 }
 
-/// Coats blend linearly; an uncoated paint is a coat of index 1, as rough as its partners', and one whose thickness nobody
-/// stated is as thick as theirs. Paints of weight 0 have no say in whether there is a coat or a thickness at all.
+/// Coats blend linearly; an uncoated paint is a coat of index 1, as rough as its partners' mean, and one whose thickness
+/// nobody stated is as thick as theirs. Paints of weight 0 have no say in whether there is a coat or a thickness at all.
 pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> Option<Coat> {
-    let first = paints.iter().find_map(|p| p.coat)?;
-    let of = |paint: &BlendedPaint| paint.coat.unwrap_or(Coat { ior: 1.0, ..first });
+    let coats: Vec<Coat> = paints.iter().filter_map(|p| p.coat).collect();
+    let stand_in = Coat {
+        ior: 1.0,
+        roughness: mean(coats.iter().map(|c| c.roughness))?,
+        thickness_um: None,
+    };
+    let thickness = mean(coats.iter().filter_map(|c| c.thickness_um));
     let mix = |get: &dyn Fn(Coat) -> f64| {
         paints
             .iter()
             .zip(weights)
-            .map(|(p, w)| w * get(of(p)))
+            .map(|(p, w)| w * get(p.coat.unwrap_or(stand_in)))
             .sum::<f64>()
     };
-    let coats = || {
-        let taking_part = paints.iter().zip(weights).filter(|(_, w)| **w != 0.0);
-        taking_part.filter_map(|(paint, _)| paint.coat)
+    let taking_part = || {
+        let weighted = paints.iter().zip(weights).filter(|(_, w)| **w != 0.0);
+        weighted.filter_map(|(paint, _)| paint.coat)
     };
     let ior = ledger.hold("coat.ior", mix(&|c| c.ior), 1.0, 4.0);
     // A coat of index 1 reflects and bends nothing, but a paint that has one gets it back.
-    if ior == 1.0 && !coats().any(|coat| coat.ior == 1.0) {
+    if ior == 1.0 && !taking_part().any(|coat| coat.ior == 1.0) {
         return None;
     }
-    let stated = coats().find_map(|coat| coat.thickness_um);
+    let stated = taking_part().any(|coat| coat.thickness_um.is_some());
     Some(Coat {
         ior,
         roughness: ledger.hold("coat.roughness", mix(&|c| c.roughness), 0.0, 1.0),
-        thickness_um: stated.map(|thickness| {
-            ledger.hold(
-                "coat.thickness_um",
-                mix(&|c| c.thickness_um.unwrap_or(thickness)),
-                0.0,
-                1e6,
-            )
+        thickness_um: thickness.filter(|_| stated).map(|thickness| {
+            let mixed = mix(&|c| c.thickness_um.unwrap_or(thickness));
+            ledger.hold("coat.thickness_um", mixed, 0.0, 1e6)
         }),
     })
+}
+
+/// Mean of some numbers, `None` of none.
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (count, sum) = values.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
+    (count > 0.0).then(|| sum / count)
 }
 
 /// Diffuse albedo blends linearly.

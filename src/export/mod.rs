@@ -24,6 +24,7 @@ mod inverse_cdf;
 mod made_up;
 mod material_json;
 mod png_file;
+mod rounding;
 mod textures;
 
 pub use alias::{AliasEntry, alias_table};
@@ -34,6 +35,7 @@ pub use gltf_brdf::GltfMaterial;
 pub use gltf_fit::LossReport;
 pub use inverse_cdf::{InverseCdf, inverse_cdf};
 pub use material_json::material_json;
+pub use rounding::Rounding;
 
 use serde::{Deserialize, Serialize};
 

@@ -4,6 +4,8 @@
 //! `c div width` of every cluster texture. Cumulative probabilities, thresholds and indices are always 32-bit floats: a
 //! half next to 1 has steps of 0.0005, and the clusters up there are the sparkle.
 
+use std::sync::OnceLock;
+
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 use image::ExtendedColorType;
@@ -14,7 +16,7 @@ use super::exr_file::{Plane, exr};
 use super::png_file::png;
 use super::{ExportError, ExportSettings, Precision, alias, inverse_cdf};
 use crate::color::{LinearRgb, luminance};
-use crate::paint::{CarPaint, FlakeSampler, Flakes, RandomTexture, mean_color};
+use crate::paint::{CarPaint, Flakes, RandomTexture, cumulative, mean_color};
 
 /// Largest number of clusters: their numbers are exact in a 32-bit float.
 const MAX_CLUSTERS: usize = 1 << 24;
@@ -231,7 +233,7 @@ impl Textures {
         )?;
         self.slices(flakes)?;
         self.corners(flakes, width, settings.precision)?;
-        let mut cumulative = FlakeSampler::new(flakes).cumulative().to_vec();
+        let mut cumulative = cumulative(flakes);
         cumulative.resize(clusters.div_ceil(width) * width, 1.0);
         let about = "cumulative probability of every cluster within its slice";
         self.floats("cumulative", width, &[("R", &cumulative)], about)?;
@@ -379,15 +381,11 @@ impl Textures {
         self.slice_losses.reserve(slices);
         for k in 0..slices {
             let range = flakes.offsets[k] as usize..flakes.offsets[k + 1] as usize;
-            let mut texels = index[k / blocks * width + k % blocks * steps..].iter_mut();
-            let loss = inverse_cdf::append(
+            let first = k / blocks * width + k % blocks * steps;
+            let loss = inverse_cdf::write(
                 &flakes.probability[range.clone()],
                 &luminances[range],
-                |cluster| {
-                    if let (Some(texel), Ok(cluster)) = (texels.next(), u16::try_from(cluster)) {
-                        *texel = cluster;
-                    }
-                },
+                &mut index[first..first + steps],
             );
             #[allow(clippy::cast_possible_truncation)] // stated to seven digits
             self.slice_losses.push(loss.map(|v| v as f32));
@@ -425,14 +423,22 @@ impl Textures {
     }
 
     fn random(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
+        static KNOWN: [OnceLock<Vec<u8>>; RandomTexture::KINDS] =
+            [const { OnceLock::new() }; RandomTexture::KINDS];
         let tile = RandomTexture::of(&flakes.texture);
-        let pixels: Vec<u8> = tile
-            .cells()
-            .iter()
-            .flat_map(|cell| cell.to_le_bytes())
-            .collect();
         let (width, height) = (tile.width() as usize, tile.height() as usize);
-        let bytes = png(width, height, &pixels, ExtendedColorType::Rgba8)?;
+        let known = &KNOWN[RandomTexture::kind(&flakes.texture)];
+        let bytes = if let Some(bytes) = known.get() {
+            bytes.clone()
+        } else {
+            let pixels: Vec<u8> = tile
+                .cells()
+                .iter()
+                .flat_map(|cell| cell.to_le_bytes())
+                .collect();
+            let bytes = png(width, height, &pixels, ExtendedColorType::Rgba8)?;
+            known.get_or_init(|| bytes).clone()
+        };
         let about = "32-bit number of every texel's cell, lowest byte in R, highest in A (read it without \
                      premultiplication or color management); the tile repeats, see carpaint_cell in the shader";
         let entry = Entry {
@@ -489,13 +495,13 @@ fn rounding(half: &[f16], exact: &[f32]) -> f32 {
 }
 
 /// The range of all corners, in 255 steps an axis.
-struct Range8 {
-    scale: [f32; 3],
-    offset: [f32; 3],
+pub(super) struct Range8 {
+    pub(super) scale: [f32; 3],
+    pub(super) offset: [f32; 3],
 }
 
 impl Range8 {
-    fn of(flakes: &Flakes) -> Self {
+    pub(super) fn of(flakes: &Flakes) -> Self {
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];
         for corner in flakes.lower.iter().chain(&flakes.upper) {

@@ -11,9 +11,7 @@ fn about() -> About {
         name: "hard".into(),
         provenance: Provenance {
             source: "sample".into(),
-            hashes: Vec::new(),
-            simulated_flakes: false,
-            notes: std::collections::BTreeMap::default(),
+            ..Provenance::default()
         },
         report: serde_json::Value::Null,
     }

@@ -33,9 +33,7 @@ fn about() -> About {
         name: "same".into(),
         provenance: Provenance {
             source: "sample".into(),
-            hashes: Vec::new(),
-            simulated_flakes: false,
-            notes: std::collections::BTreeMap::default(),
+            ..Provenance::default()
         },
         report: serde_json::Value::Null,
     }

@@ -5,7 +5,7 @@
 
 use crate::paints::{Stream, flakes, metallic};
 use carpaint::export::{alias_table, inverse_cdf};
-use carpaint::paint::{FlakeSampler, RandomTexture, TexelDraw};
+use carpaint::paint::{FlakeSampler, RandomTexture, TexelDraw, cumulative};
 
 /// Pearson's statistic over cells that expect at least five draws, and its degrees of freedom.
 fn chi_square(counts: &[u64], probability: &[f64]) -> (f64, f64) {
@@ -107,13 +107,12 @@ fn texels_pick_clusters_as_often_as_they_are_probable_at_every_angle() {
         .map(|(p, k)| (p, [f32::from(k), 0.0, 0.0], [f32::from(k), 0.0, 0.0]))
         .collect();
     let metallic = flakes(&[0.0, 40.0], &[0.0, 40.0], &boxes);
-    let sampler = FlakeSampler::new(&metallic);
+    let cumulative = &cumulative(&metallic)[..40];
     let persistence = [8.0, 40.0];
     let mut random = Stream(12);
     let cells: Vec<u32> = (0..400_000).map(|_| random.bits() as u32).collect();
     for (h, d) in [(0.0, 0.0), (13.7, 2.0), (40.0, 40.0), (77.0, 80.0)] {
         let mut counts = vec![0_u64; 40];
-        let cumulative = &sampler.cumulative()[..40];
         for &cell in &cells {
             let draw = TexelDraw::of(cell, h, d, persistence);
             assert!((0.0..1.0).contains(&draw.pick));
