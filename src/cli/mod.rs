@@ -12,6 +12,7 @@ mod profile;
 mod progress;
 mod realise;
 mod samples;
+mod selftest;
 mod serve;
 mod show;
 mod texels;
@@ -55,6 +56,7 @@ enum Command {
     Texels(texels::Texels),
     Evaluate(evaluate::Evaluate),
     Samples(samples::Samples),
+    Selftest(selftest::Selftest),
 }
 
 const EXAMPLES: &str = "\
@@ -105,6 +107,7 @@ fn start(cli: Cli) -> Result<(), WorkshopError> {
         Command::Texels(command) => command.run(json),
         Command::Evaluate(command) => command.run(json),
         Command::Samples(command) => command.run(json),
+        Command::Selftest(command) => command.run(json),
     }
 }
 

@@ -13,6 +13,7 @@ mod ingest;
 mod previewing;
 mod realising;
 mod samples;
+mod selftest;
 mod thing;
 
 pub use blending::{Blended, blend_paints};
@@ -30,4 +31,5 @@ pub use ingest::{
 pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
+pub use selftest::{Check, selftest};
 pub use thing::{Source, Thing, find, open, open_paint, read};
