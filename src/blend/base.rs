@@ -34,15 +34,21 @@ pub(super) fn common_grid<'a>(
     }
 }
 
-/// Coats blend linearly; an uncoated paint is a coat of index 1, as rough and thick as its partners'.
-pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> Option<Coat> {
+/// A coat for every paint: an uncoated one is a coat of index 1, as rough and thick as its partners'. `None` of none.
+pub(super) fn coats(paints: &[BlendedPaint]) -> Option<Vec<Coat>> {
     let first = paints.iter().find_map(|p| p.coat)?;
     let of = |paint: &BlendedPaint| paint.coat.unwrap_or(Coat { ior: 1.0, ..first });
+    Some(paints.iter().map(of).collect())
+}
+
+/// Coats blend linearly.
+pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> Option<Coat> {
+    let coats = coats(paints)?;
     let mix = |get: &dyn Fn(Coat) -> f64| {
-        paints
+        coats
             .iter()
             .zip(weights)
-            .map(|(p, w)| w * get(of(p)))
+            .map(|(&coat, w)| w * get(coat))
             .sum::<f64>()
     };
     let ior = ledger.hold("coat.ior", mix(&|c| c.ior), 1.0, 4.0);

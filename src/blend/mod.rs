@@ -16,12 +16,14 @@ mod correspondence;
 mod file;
 mod lobes;
 mod mixture;
+mod parts;
 mod realise;
 mod weights;
 
 pub use clamp::Clamp;
 pub use correspondence::{BlendSettings, CorrespondenceReport};
 pub use file::BlendFileError;
+pub(crate) use parts::Part;
 pub use realise::Realised;
 pub use weights::{RealisationWeights, WeightError};
 

@@ -21,7 +21,7 @@ use crate::blend::RealisationWeights;
 #[into_params(parameter_in = Query)]
 pub struct ProfileQuery {
     /// Accuracy.
-    profile: Option<Preset>,
+    pub(super) profile: Option<Preset>,
 }
 
 /// A blend at some weights, as a file.

@@ -115,6 +115,10 @@ impl Works for Workshop {
         Ok(workshop::realise(thing, weights, format, &profile(accuracy)?)?.bytes)
     }
 
+    fn bundle(&self, blend: &Thing, accuracy: Accuracy) -> Result<Vec<u8>, WorkError> {
+        Ok(workshop::bundle_blend(blend, &profile(accuracy)?)?.bytes)
+    }
+
     fn preview(
         &self,
         thing: &Thing,

@@ -4,6 +4,7 @@
 //! a function that hears the share done. Every failure is a [`WorkshopError`] that says whose fault it is.
 
 mod blending;
+mod bundling;
 mod describing;
 mod error;
 mod evaluating;
@@ -14,6 +15,7 @@ mod samples;
 mod thing;
 
 pub use blending::{Blended, blend_paints};
+pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};
 pub use error::{Fault, WorkshopError};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
@@ -22,3 +24,6 @@ pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, t
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
 pub use thing::{Source, Thing, find, open, open_paint, read};
+
+#[cfg(test)]
+mod tests;

@@ -122,6 +122,10 @@ impl Works for Pretend {
         Ok(format!("{format:?} {diffuse:?}").into_bytes())
     }
 
+    fn bundle(&self, blend: &Thing, accuracy: Accuracy) -> Result<Vec<u8>, WorkError> {
+        carpaint::service::Workshop::new(carpaint::paint::Limits::default()).bundle(blend, accuracy)
+    }
+
     fn preview(
         &self,
         thing: &Thing,

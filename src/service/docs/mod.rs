@@ -11,7 +11,10 @@ use utoipa::openapi::PathItem;
 use super::answer::{Answer, Keep};
 use super::extract::Address;
 use super::problem::{Kind, Problem, ProblemDocument};
-use super::{blends, documents, jobs, operations, paints, previews, realisations, runner, works};
+use super::{
+    blend_bundles, blends, documents, jobs, operations, paints, previews, realisations, runner,
+    works,
+};
 
 /// Only what this service itself serves.
 const POLICY: &str =
@@ -27,7 +30,7 @@ const POLICY: &str =
     ),
     paths(
         paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete,
-        blends::create, blends::show,
+        blends::create, blends::show, blend_bundles::bundle,
         realisations::of_blend, realisations::of_paint,
         previews::of_blend, previews::of_paint,
         jobs::show, jobs::events, jobs::cancel,
