@@ -107,6 +107,16 @@ fn target(
     })
 }
 
+/// What the paint shows at the instrument's geometries and beside them.
+fn targets(reflectance: &Reflectance<'_>) -> Vec<Target> {
+    instrument_pairs()
+        .into_iter()
+        .map(|pair| (pair, 1.0))
+        .chain(pairs_beside().map(|pair| (pair, BESIDE)))
+        .filter_map(|(pair, weight)| target(reflectance, pair, weight))
+        .collect()
+}
+
 /// CIELAB of a BRDF value under the instrument's light.
 fn reflected(f: LinearRgb) -> Lab {
     Lab::from_rgb(f.map(|v| std::f64::consts::PI * v))
@@ -141,12 +151,7 @@ fn hue_travels(targets: &[Target]) -> bool {
 
 /// The material, with the loss that it has.
 pub(super) fn fit(reflectance: &Reflectance<'_>) -> (GltfMaterial, LossReport) {
-    let targets: Vec<Target> = instrument_pairs()
-        .into_iter()
-        .map(|pair| (pair, 1.0))
-        .chain(pairs_beside().map(|pair| (pair, BESIDE)))
-        .filter_map(|(pair, weight)| target(reflectance, pair, weight))
-        .collect();
+    let targets = targets(reflectance);
     let mut best = fit_plain(reflectance, &targets);
     if best.merit > GOOD_ENOUGH && hue_travels(&targets) {
         let film = fit_film(&best, &targets);
@@ -437,171 +442,4 @@ fn fit_film(plain: &Candidate, targets: &[Target]) -> Candidate {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::export::made_up::metallic;
-    use crate::paint::{CarPaint, ColorTable, Lobe};
-
-    #[test]
-    fn what_gltf_can_say_it_says() {
-        // A Lambertian base under a coat is a glTF material but for the coat's transmission.
-        let paint = CarPaint {
-            coat: None,
-            diffuse: [0.3, 0.1, 0.05],
-            lobes: vec![],
-            color_table: ColorTable::white(),
-            flakes: None,
-        };
-        let (_, loss) = fit(&Reflectance::new(&paint));
-        assert!(loss.worst < 1.0, "{loss:?}");
-    }
-
-    #[test]
-    fn a_metallic_is_met_within_a_just_visible_difference() {
-        let paint = metallic(8, 6, 20);
-        let (material, loss) = fit(&Reflectance::new(&paint));
-        assert!(loss.median < 3.0, "{loss:?} {material:?}");
-    }
-
-    /// Günther et al. 2005: diffuse; weights of three lobes; α; F0. The published flakes are not part of the fits.
-    const PUBLISHED: [(&str, [[f64; 3]; 6]); 4] = [
-        (
-            "silver",
-            [
-                [0.055, 0.063, 0.071],
-                [0.065, 0.082, 0.088],
-                [0.11, 0.11, 0.13],
-                [0.008, 0.013, 0.015],
-                [0.38, 0.17, 0.013],
-                [1.0, 0.92, 0.9],
-            ],
-        ),
-        (
-            "gray",
-            [
-                [0.012, 0.015, 0.016],
-                [0.062, 0.076, 0.08],
-                [0.11, 0.12, 0.12],
-                [0.0083, 0.015, 0.016],
-                [0.39, 0.17, 0.013],
-                [0.92, 0.87, 0.9],
-            ],
-        ),
-        (
-            "blue",
-            [
-                [0.0079, 0.023, 0.1],
-                [0.0011, 0.0015, 0.0019],
-                [0.025, 0.03, 0.043],
-                [0.059, 0.074, 0.082],
-                [0.15, 0.043, 0.02],
-                [1.0, 0.094, 0.17],
-            ],
-        ),
-        (
-            "acrylic",
-            [
-                [0.42, 0.32, 0.1],
-                [0.0, 0.0, 0.0],
-                [0.028, 0.026, 0.006],
-                [0.017, 0.0075, 0.0041],
-                [0.88, 0.8, 0.015],
-                [1.0, 0.9, 0.17],
-            ],
-        ),
-    ];
-
-    #[test]
-    fn published_paints_are_met() {
-        for (name, [diffuse, first, second, third, alpha, f0]) in PUBLISHED {
-            let lobe = |k: usize, weight| Lobe {
-                weight,
-                alpha: alpha[k],
-                f0: f0[k],
-            };
-            let lobes = vec![lobe(0, first), lobe(1, second), lobe(2, third)];
-            let paint = CarPaint {
-                coat: None,
-                diffuse,
-                lobes,
-                color_table: ColorTable::white(),
-                flakes: None,
-            };
-            let (material, loss) = fit(&Reflectance::new(&paint));
-            assert!(loss.median < 3.0 && loss.worst < 10.0, "{name}: {loss:?}");
-            assert!(
-                material.clearcoat > 0.1 && material.clearcoat_roughness < 0.2,
-                "{name} keeps its lacquer"
-            );
-        }
-    }
-
-    /// A paint whose base is a thin film: what is reflected by a facet has the film's color at its angle of incidence.
-    fn interference(ior: f64, thickness_nm: f64) -> CarPaint {
-        let angles = |n: u32, step: f64| {
-            crate::paint::AngleGrid::new((0..n).map(|k| f64::from(k) * step).collect())
-                .expect("ascending")
-        };
-        let (theta_h, theta_d) = (angles(2, 45.0), angles(19, 5.0));
-        let nodes: Vec<Lab> = (0..2 * theta_d.len())
-            .map(|k| {
-                let incidence = theta_d.degrees()[k % theta_d.len()].to_radians();
-                Lab::from_rgb(super::super::gltf_brdf::thin_film(
-                    ior,
-                    thickness_nm,
-                    incidence.cos(),
-                    [0.3; 3],
-                ))
-            })
-            .collect();
-        let white = Lab {
-            l: 100.0,
-            a: 0.0,
-            b: 0.0,
-        };
-        CarPaint {
-            coat: Some(crate::paint::Coat::smooth(1.5)),
-            diffuse: [0.0; 3],
-            lobes: vec![Lobe {
-                weight: [0.25; 3],
-                alpha: 0.6,
-                f0: 1.0,
-            }],
-            color_table: ColorTable::new(theta_h, theta_d, nodes, white).expect("fits"),
-            flakes: None,
-        }
-    }
-
-    #[test]
-    fn search() {
-        for ior in [1.4, 1.6, 1.8, 2.0, 2.4] {
-            for t in [200.0, 300.0, 400.0, 500.0, 600.0, 800.0] {
-                for coated in [true, false] {
-                    let mut paint = interference(ior, t);
-                    if !coated {
-                        paint.coat = None;
-                    }
-                    let reflectance = Reflectance::new(&paint);
-                    let targets: Vec<Target> = instrument_pairs()
-                        .into_iter()
-                        .map(|pair| (pair, 1.0))
-                        .chain(pairs_beside().map(|pair| (pair, BESIDE)))
-                        .filter_map(|(pair, weight)| target(&reflectance, pair, weight))
-                        .collect();
-                    let plain = fit_plain(&reflectance, &targets);
-                    let film = fit_film(&plain, &targets);
-                    let (m, l) = fit(&reflectance);
-                    println!(
-                        "{ior} {t} {coated}: plain {:.1} film {:.1} travels {} chosen {:.2} median {:.2} plain {:.2}",
-                        plain.merit,
-                        film.merit,
-                        hue_travels(&targets),
-                        m.iridescence,
-                        l.median,
-                        loss(&plain.material, &reflectance, None).median
-                    );
-                }
-            }
-        }
-    }
-}
+mod tests;

@@ -37,8 +37,9 @@ const distance = (got, want, black) =>
 const worst = (list, get) => Math.max(...list.map(get));
 
 for (const name of ["duo", "trio"]) {
-  for (const precision of ["f32", "f16"]) {
-    test(`${name} in ${precision}: 50 direction pairs at every weights shade to what evaluate finds, within 1 %`, async () => {
+  // Halves of corners round at 0.03 Lab; floats only as a GPU does.
+  for (const [precision, tolerance] of [["f32", 1e-4], ["f16", 0.01]]) {
+    test(`${name} in ${precision}: 50 direction pairs at every weights shade to what evaluate finds, within ${100 * tolerance} %`, async () => {
       for (const { weights, pairs, slices } of await cases(name)) {
         assert.equal(pairs.length, 50);
         const directions = pairs.map(({ wi, wo }) => [wi, wo]);
@@ -54,13 +55,13 @@ for (const name of ["duo", "trio"]) {
           worst(slices, ({ mean }, k) => distance(means[k], mean, 1e-3)),
         ];
         console.log(`  ${told(weights)}: whole, base, slice means off by ${off.map((d) => d.toExponential(1)).join(", ")}`);
-        assert.ok(Math.max(...off) < 0.01, `${off}`);
+        assert.ok(Math.max(...off) < tolerance, `${off}`);
         pairs.forEach(({ mirror }, k) => assert.ok(Math.abs(whole[k][3] - mirror) < 1e-4));
       }
     });
   }
 
-  for (const [precision, tolerance] of [["f32", 1e-3], ["f16", 0.02]]) {
+  for (const [precision, tolerance] of [["f32", 1e-4], ["f16", 0.01]]) {
     test(`${name} in ${precision}: 400 texels at every weights show the flakes that carpaint draws`, async () => {
       for (const { weights, texels } of await cases(name)) {
         const got = await shade(`${name}_${precision}`, texels.map(({ texel, angles }) => [texel, angles]), `
