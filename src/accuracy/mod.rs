@@ -1,8 +1,22 @@
 //! Accuracy: the profiles that trade time against it.
 //!
 //! Every room owns its settings; a [`Profile`] is those settings together, handed down as they are. No room below asks
-//! what the profile is called.
+//! what the profile is called. What a result's settings cost in accuracy is measured here: [`clustering_error`] of an
+//! ingest, [`blend_deviation`] of a correspondence, [`writing_error`] of a file, [`sparkle`] of any paint.
 
+mod clustering;
+mod correspondence;
+mod error;
+mod geometries;
+mod knobs;
 mod profile;
+mod sparkle;
+mod writing;
 
-pub use profile::{Profile, ProfileError};
+pub use clustering::{clustering_error, predicted_clustering_error};
+pub use correspondence::blend_deviation;
+pub use error::{ResultError, Term, blend_error, file_error, paint_error};
+pub use knobs::{CostKnob, Draw, Knobs, Preset, ProfileError, Transport};
+pub use profile::{PRESETS, Profile};
+pub use sparkle::{Sparkle, sparkle};
+pub use writing::{WritingError, writing_error};

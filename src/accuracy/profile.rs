@@ -1,18 +1,21 @@
 //! Accuracy profiles: the settings of all rooms, together.
+//!
+//! `standard` is the knee of the fronts that the study draws (`carpaint study`, docs/study): beyond it, time grows faster
+//! than the error falls. `draft` is for sliders and thumbnails, `reference` is what the others are measured against.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::blend::BlendSettings;
+use super::knobs::{Knobs, ProfileError};
+use crate::blend::{BlendSettings, Order};
 use crate::export::{ExportSettings, Precision};
-use crate::fit::ClusterSettings;
+use crate::fit::{BoxRule, ClusterSettings};
 use crate::transport::{Cost, Method};
 
 /// Everything that trades time against accuracy.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+///
+/// Written as its knobs, all of them; read from knobs beside a preset, or from the preset's name alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
-    /// Name of the preset this began as, `custom` once a knob was turned.
-    pub name: String,
     /// How flakes are clustered.
     pub flakes: ClusterSettings,
     /// How correspondences are found.
@@ -23,17 +26,8 @@ pub struct Profile {
     pub samples_per_pixel: u32,
 }
 
-/// Why there is no such profile.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProfileError {
-    /// Unknown name.
-    #[error("there is no profile '{0}'; there are draft, standard and reference")]
-    Name(String),
-    /// Clusters out of range.
-    #[error("{0} clusters a slice, accepted are 1 to 4096")]
-    Clusters(usize),
-}
+/// Names of the presets, the cheapest first.
+pub const PRESETS: [&str; 3] = ["draft", "standard", "reference"];
 
 impl Default for Profile {
     fn default() -> Self {
@@ -42,38 +36,31 @@ impl Default for Profile {
 }
 
 impl Profile {
-    /// Fast: few clusters, greedy correspondence, few samples.
+    /// Fast: few clusters, every second angle, greedy correspondence, few samples.
     #[must_use]
     pub fn draft() -> Self {
-        let standard = Self::standard();
         Self {
-            name: "draft".to_owned(),
             flakes: ClusterSettings {
                 clusters: 24,
-                ..standard.flakes
+                box_rule: BoxRule::Moments,
+                angle_step: 2,
             },
             blend: BlendSettings {
                 method: Method::Greedy,
                 cost: Cost::Distance,
+                order: Order::Canonical,
             },
             samples_per_pixel: 16,
-            ..standard
+            ..Self::standard()
         }
     }
 
-    /// What the paper chose: 50 clusters a slice, exact transport.
+    /// The knee: 50 clusters a slice, exact transport.
     #[must_use]
     pub fn standard() -> Self {
         Self {
-            name: "standard".to_owned(),
-            flakes: ClusterSettings {
-                clusters: 50,
-                ..ClusterSettings::default()
-            },
-            blend: BlendSettings {
-                method: Method::Exact,
-                cost: Cost::Distance,
-            },
+            flakes: ClusterSettings::default(),
+            blend: BlendSettings::default(),
             export: ExportSettings::default(),
             samples_per_pixel: 64,
         }
@@ -84,17 +71,19 @@ impl Profile {
     pub fn reference() -> Self {
         let standard = Self::standard();
         Self {
-            name: "reference".to_owned(),
             flakes: ClusterSettings {
                 clusters: 200,
                 ..standard.flakes
+            },
+            blend: BlendSettings {
+                order: Order::Cheapest,
+                ..standard.blend
             },
             export: ExportSettings {
                 precision: Precision::F32,
                 ..standard.export
             },
             samples_per_pixel: 256,
-            ..standard
         }
     }
 
@@ -112,25 +101,91 @@ impl Profile {
         }
     }
 
+    /// Name of the preset that has these very settings, `custom` where none has.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        let same = |name: &&&str| Self::named(name).is_ok_and(|preset| preset == *self);
+        PRESETS.iter().find(same).copied().unwrap_or("custom")
+    }
+
     /// The same profile with another number of clusters per slice.
     ///
     /// # Errors
     ///
-    /// [`ProfileError::Clusters`] outside 1 to 4096.
+    /// [`ProfileError::Range`] outside 1 to 4096.
     pub fn with_clusters(self, clusters: usize) -> Result<Self, ProfileError> {
-        if !(1..=4096).contains(&clusters) {
-            return Err(ProfileError::Clusters(clusters));
+        Knobs {
+            clusters: Some(u32::try_from(clusters).unwrap_or(u32::MAX)),
+            ..Knobs::default()
         }
-        if clusters == self.flakes.clusters {
-            return Ok(self);
+        .turned(self)
+    }
+}
+
+impl std::str::FromStr for Profile {
+    type Err = ProfileError;
+
+    /// A preset, knobs, or both: `standard`, `draft,clusters=40`, `transport=sinkhorn,epsilon=0.02`.
+    fn from_str(text: &str) -> Result<Self, ProfileError> {
+        text.parse::<Knobs>()?.profile()
+    }
+}
+
+impl Serialize for Profile {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Knobs::of(self).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Profile {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Knobs::of_name_or_object(deserializer)?
+            .profile()
+            .map_err(serde::de::Error::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_preset_is_recognised_by_its_settings_whatever_it_was_called() {
+        for name in PRESETS {
+            let preset = Profile::named(name).expect("a preset");
+            assert_eq!(preset.name(), name);
+            assert_eq!(
+                preset.with_clusters(51).expect("in range").name(),
+                "custom",
+                "{name}"
+            );
         }
-        Ok(Self {
-            name: "custom".to_owned(),
-            flakes: ClusterSettings {
-                clusters,
-                ..self.flakes
-            },
-            ..self
-        })
+        let spelled: Profile =
+            "draft,clusters=50,angle_step=1,transport=exact,samples_per_pixel=64"
+                .parse()
+                .expect("knobs");
+        assert_eq!(spelled.name(), "standard");
+    }
+
+    #[test]
+    fn a_profile_reads_back_from_what_it_is_written_as() {
+        for name in PRESETS {
+            let preset = Profile::named(name).expect("a preset");
+            let text = serde_json::to_string(&preset).expect("serialises");
+            assert_eq!(
+                serde_json::from_str::<Profile>(&text).expect("reads back"),
+                preset,
+                "{text}"
+            );
+            let by_name: Profile =
+                serde_json::from_value(serde_json::json!(name)).expect("by name");
+            assert_eq!(by_name, preset);
+        }
+        let sinkhorn: Profile = "transport=sinkhorn,epsilon=0.02".parse().expect("knobs");
+        let text = serde_json::to_string(&sinkhorn).expect("serialises");
+        assert_eq!(
+            serde_json::from_str::<Profile>(&text).expect("reads back"),
+            sinkhorn
+        );
     }
 }

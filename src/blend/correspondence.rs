@@ -1,9 +1,10 @@
 //! The correspondence of several paints' flakes, slice by slice, by optimal transport.
 //!
 //! Two paints are transported onto each other; of their blend the realisation at equal weights is transported onto the
-//! third, and so on in the order of content hashes (Golla and Klein 2018, 4.3). Every entry of a plan becomes a cluster
-//! with one probability and one box per paint. Clusters are kept in the order of their lightness at equal weights: that
-//! order never depends on the weights of a realisation, so nothing flickers when they change.
+//! third, and so on (Golla and Klein 2018, 4.3), in the order of content hashes or in the cheapest of all orders
+//! ([`Order`]). Every entry of a plan becomes a cluster with one probability and one box per paint. Clusters are kept in
+//! the order of their lightness at equal weights: that order never depends on the weights of a realisation, so nothing
+//! flickers when they change.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -11,8 +12,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::base::common_grid;
 use super::mixture::{Cluster, clusters_at};
+use super::order::{Order, orders};
+use super::pairs::{PairReport, pair_reports};
 use super::{BlendError, BlendedFlakes, Boxes};
-use crate::paint::{CarPaint, FlakeTexture};
+use crate::paint::{AngleGrid, CarPaint, FlakeTexture};
 use crate::transport::{Cost, Method, Plan, Problem, Solver, TransportError, Workspace};
 
 /// How correspondences are found.
@@ -23,6 +26,20 @@ pub struct BlendSettings {
     pub method: Method,
     /// Cost of moving between two cluster centers in Lab.
     pub cost: Cost,
+    /// Order in which more than two paints are joined.
+    #[serde(default)]
+    pub order: Order,
+}
+
+/// How far a blend at equal weights is, at one instrument geometry, from the blend by exact transport.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BlendDeviation {
+    /// Aspecular angle, degrees.
+    pub aspecular_deg: f64,
+    /// CIEDE2000 of the mean color.
+    pub delta_e_2000: f64,
+    /// Relative difference of the 99.9th percentile of the flakes' luminance.
+    pub sparkle: f64,
 }
 
 /// How good a correspondence is.
@@ -36,6 +53,16 @@ pub struct CorrespondenceReport {
     pub mean_cost: f64,
     /// Largest gap of a slice between its plan and the dual bound: no plan is further from optimal.
     pub largest_gap: f64,
+    /// Order in which the paints were joined, by place in hash order.
+    #[serde(default)]
+    pub order: Vec<usize>,
+    /// What the correspondence of each pair of paints costs, and how far that is from the best for the pair alone.
+    #[serde(default)]
+    pub pairs: Vec<PairReport>,
+    /// What exact transport of the distance would have given at equal weights, at the instrument geometries; empty
+    /// where that is what was done, and before it was measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub against_exact: Vec<BlendDeviation>,
     /// Paints whose slices were mixed because their angles differ from the common grid's, by place in hash order.
     pub mixed: Vec<usize>,
     /// Paints without flakes, by place in hash order.
@@ -43,59 +70,95 @@ pub struct CorrespondenceReport {
 }
 
 /// One slice's corresponding clusters: probabilities, and boxes paint by paint.
-struct SliceBlend {
-    probability: Vec<f64>,
-    boxes: Vec<Vec<([f32; 3], [f32; 3])>>,
-    cost: f64,
-    gap: f64,
+pub(super) struct SliceBlend {
+    pub probability: Vec<f64>,
+    pub boxes: Vec<Vec<([f32; 3], [f32; 3])>>,
+    pub cost: f64,
+    pub gap: f64,
 }
 
 /// Memory of one thread.
 #[derive(Default)]
-struct Bench {
-    problem: Problem,
-    workspace: Workspace,
-    plan: Plan,
-    clusters: Vec<Cluster>,
+pub(super) struct Bench {
+    pub problem: Problem,
+    pub workspace: Workspace,
+    pub plan: Plan,
+    pub clusters: Vec<Cluster>,
 }
 
-/// Corresponding clusters of paints in the order given, and how good they are.
+/// The common angles, θd fastest.
+#[derive(Clone, Copy)]
+pub(super) struct Grid<'a> {
+    theta_h: &'a AngleGrid,
+    theta_d: &'a AngleGrid,
+}
+
+impl Grid<'_> {
+    pub fn slices(&self) -> usize {
+        self.theta_h.len() * self.theta_d.len()
+    }
+
+    /// θh and θd of slice `k`, degrees.
+    pub fn angles(&self, k: usize) -> (f64, f64) {
+        let columns = self.theta_d.len();
+        (
+            self.theta_h.degrees()[k / columns],
+            self.theta_d.degrees()[k % columns],
+        )
+    }
+
+    /// What a solver says of slice `k`.
+    pub fn refused(&self, k: usize, source: TransportError) -> BlendError {
+        let (theta_h_deg, theta_d_deg) = self.angles(k);
+        BlendError::Transport {
+            theta_h_deg,
+            theta_d_deg,
+            source,
+        }
+    }
+}
+
+/// Corresponding clusters of paints in the order given, and how good they are; on their common angles, or on others.
 pub(super) fn correspond(
     paints: &[&CarPaint],
     settings: &BlendSettings,
+    on: Option<(AngleGrid, AngleGrid)>,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<(Option<BlendedFlakes>, CorrespondenceReport), BlendError> {
     let grids = paints
         .iter()
         .filter_map(|p| p.flakes.as_ref())
         .map(|f| (&f.theta_h, &f.theta_d));
-    let Some((theta_h, theta_d)) = common_grid(grids)? else {
+    let Some(common) = common_grid(grids)? else {
         return Ok((None, CorrespondenceReport::default()));
     };
-    let count = theta_h.len() * theta_d.len();
+    let (theta_h, theta_d) = on.unwrap_or(common);
+    let grid = Grid {
+        theta_h: &theta_h,
+        theta_d: &theta_d,
+    };
+    let count = grid.slices();
+    let tried = orders(paints.len(), settings.order);
     let done = AtomicUsize::new(0);
-    let slices: Vec<SliceBlend> = (0..count)
-        .into_par_iter()
-        .map_init(Bench::default, |bench, k| {
-            let (h, d) = (
-                theta_h.degrees()[k / theta_d.len()],
-                theta_d.degrees()[k % theta_d.len()],
-            );
-            let slice = blend_slice(paints, h, d, settings, bench).map_err(|source| {
-                BlendError::Transport {
-                    theta_h_deg: h,
-                    theta_d_deg: d,
-                    source,
-                }
-            });
-            let so_far = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if so_far.is_multiple_of(64) || so_far == count {
-                #[allow(clippy::cast_precision_loss)] // a progress bar
-                progress(so_far as f32 / count as f32);
-            }
-            slice
-        })
-        .collect::<Result<_, _>>()?;
+    let all = count * tried.len();
+    let tell = || {
+        let so_far = done.fetch_add(1, Ordering::Relaxed) + 1;
+        if so_far.is_multiple_of(64) || so_far == all {
+            #[allow(clippy::cast_precision_loss)] // a progress bar
+            progress(so_far as f32 / all as f32);
+        }
+    };
+    let mut best: Option<(f64, Vec<usize>, Vec<SliceBlend>)> = None;
+    for order in tried {
+        let slices = join_in_order(paints, &order, grid, settings, &tell)?;
+        let cost = slices.iter().map(|s| s.pairwise_cost(settings.cost)).sum();
+        // Of equals the first, which is the canonical order where it is among them.
+        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
+            best = Some((cost, order, slices));
+        }
+    }
+    let (_, order, slices) = best.unwrap_or_default();
+    let pairs = pair_reports(paints, &slices, grid, settings, &order)?;
 
     let total: usize = slices.iter().map(|s| s.probability.len()).sum();
     let with_room = || Boxes {
@@ -109,6 +172,8 @@ pub(super) fn correspond(
     let mut report = CorrespondenceReport {
         slices: count,
         clusters: total,
+        order,
+        pairs,
         ..Default::default()
     };
     for slice in slices {
@@ -145,41 +210,68 @@ pub(super) fn correspond(
     ))
 }
 
-/// Grain and lifetime of each paint; one without flakes has those of the first that has.
+/// All slices with the paints joined in this order; boxes stay in the paints' own order.
+fn join_in_order(
+    paints: &[&CarPaint],
+    order: &[usize],
+    grid: Grid<'_>,
+    settings: &BlendSettings,
+    tell: &(dyn Fn() + Sync),
+) -> Result<Vec<SliceBlend>, BlendError> {
+    (0..grid.slices())
+        .into_par_iter()
+        .map_init(Bench::default, |bench, k| {
+            let slice = blend_slice(paints, order, grid.angles(k), settings, bench);
+            tell();
+            slice.map_err(|source| grid.refused(k, source))
+        })
+        .collect()
+}
+
+/// Grain and lifetime of each paint; one without flakes has the mean of those that have.
 fn textures(paints: &[&CarPaint]) -> Vec<FlakeTexture> {
-    let own = |p: &&CarPaint| p.flakes.as_ref().map(|f| f.texture);
-    let Some(first) = paints.iter().find_map(own) else {
+    let own: Vec<Option<FlakeTexture>> = paints
+        .iter()
+        .map(|p| p.flakes.as_ref().map(|f| f.texture))
+        .collect();
+    let known: Vec<&FlakeTexture> = own.iter().flatten().collect();
+    if known.is_empty() {
         return Vec::new();
+    }
+    let mean = |get: &dyn Fn(&FlakeTexture) -> f64| {
+        known.iter().map(|t| get(t)).sum::<f64>() / known.len() as f64
     };
-    paints.iter().map(|p| own(p).unwrap_or(first)).collect()
+    let stand_in = FlakeTexture {
+        texel_um: mean(&|t| t.texel_um),
+        grain_um: mean(&|t| t.grain_um),
+        lifetime_deg: [mean(&|t| t.lifetime_deg[0]), mean(&|t| t.lifetime_deg[1])],
+        persistence_deg: [
+            mean(&|t| t.persistence_deg[0]),
+            mean(&|t| t.persistence_deg[1]),
+        ],
+    };
+    own.into_iter().map(|t| t.unwrap_or(stand_in)).collect()
 }
 
 fn blend_slice(
     paints: &[&CarPaint],
-    theta_h_deg: f64,
-    theta_d_deg: f64,
+    order: &[usize],
+    (theta_h_deg, theta_d_deg): (f64, f64),
     settings: &BlendSettings,
     bench: &mut Bench,
 ) -> Result<SliceBlend, TransportError> {
-    clusters_at(
-        paints[0].flakes.as_ref(),
-        theta_h_deg,
-        theta_d_deg,
-        &mut bench.clusters,
-    );
+    let clusters_of = |place: usize, out: &mut Vec<Cluster>| {
+        clusters_at(paints[place].flakes.as_ref(), theta_h_deg, theta_d_deg, out);
+    };
+    clusters_of(order[0], &mut bench.clusters);
     let mut slice = SliceBlend {
         probability: bench.clusters.iter().map(|c| c.probability).collect(),
         boxes: vec![bench.clusters.iter().map(|c| (c.lower, c.upper)).collect()],
         cost: 0.0,
         gap: 0.0,
     };
-    for paint in &paints[1..] {
-        clusters_at(
-            paint.flakes.as_ref(),
-            theta_h_deg,
-            theta_d_deg,
-            &mut bench.clusters,
-        );
+    for &place in &order[1..] {
+        clusters_of(place, &mut bench.clusters);
         let source =
             (0..slice.probability.len()).map(|k| (slice.even_center(k), slice.probability[k]));
         let target = bench.clusters.iter().map(|c| (c.center(), c.probability));
@@ -193,6 +285,7 @@ fn blend_slice(
         slice.join(&bench.plan, &bench.clusters);
     }
     slice.sort_by_lightness();
+    slice.put_back(order);
     Ok(slice)
 }
 
@@ -222,6 +315,15 @@ impl SliceBlend {
         self.probability = plan.entries.iter().map(|e| e.mass).collect();
         self.cost += plan.cost;
         self.gap = self.gap.max(plan.gap);
+    }
+
+    /// Brings the boxes from the order of joining to the paints' own.
+    fn put_back(&mut self, order: &[usize]) {
+        let mut boxes = vec![Vec::new(); order.len()];
+        for (own, &place) in std::mem::take(&mut self.boxes).into_iter().zip(order) {
+            boxes[place] = own;
+        }
+        self.boxes = boxes;
     }
 
     fn sort_by_lightness(&mut self) {

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Blend, BlendSettings, BlendedFlakes, BlendedPaint, Boxes, CorrespondenceReport, PAINTS,
+    Blend, BlendSettings, BlendedFlakes, BlendedPaint, Boxes, CorrespondenceReport, Origin, PAINTS,
 };
 use crate::color::{Lab, LinearRgb};
 use crate::paint::{
-    AngleGrid, CarPaint, Coat, ColorTable, Container, ContainerError, FlakeTexture, Flakes, Limits,
-    Lobe, PaintError, Reader, Writer,
+    AngleGrid, CarPaint, Clustering, Coat, ColorTable, Container, ContainerError, FlakeTexture,
+    Flakes, Limits, Lobe, PaintError, Reader, Writer,
 };
 
 /// Latest version of the file that is read and the one that is written.
@@ -53,6 +53,10 @@ struct PaintHeader {
     diffuse: LinearRgb,
     lobes: Vec<Lobe>,
     chi_overall: Lab,
+    #[serde(default, skip_serializing_if = "Origin::is_plain")]
+    origin: Origin,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    clustering: Option<Clustering>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -230,6 +234,8 @@ impl PaintHeader {
             diffuse: paint.diffuse,
             lobes: paint.lobes.clone(),
             chi_overall: paint.color_table.overall(),
+            origin: paint.origin,
+            clustering: paint.clustering.clone(),
         }
     }
 
@@ -240,6 +246,8 @@ impl PaintHeader {
             coat,
             diffuse,
             lobes,
+            origin,
+            clustering,
             ..
         } = self;
         BlendedPaint {
@@ -249,6 +257,8 @@ impl PaintHeader {
             diffuse,
             lobes,
             color_table,
+            origin,
+            clustering,
         }
     }
 }

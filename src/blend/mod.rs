@@ -11,25 +11,33 @@
 //! Left to others: solving a transport problem (`transport`), reducing clusters of a paint that has too many (`fit`).
 
 mod base;
+mod boxes;
 mod clamp;
 mod correspondence;
 mod file;
 mod lobes;
 mod mixture;
+mod order;
+mod origin;
+mod pairs;
 mod parts;
 mod realise;
+mod thinned;
 mod weights;
 
 pub use clamp::Clamp;
-pub use correspondence::{BlendSettings, CorrespondenceReport};
+pub use correspondence::{BlendDeviation, BlendSettings, CorrespondenceReport};
 pub use file::BlendFileError;
+pub use order::Order;
+pub use origin::{Origin, Reduction};
+pub use pairs::PairReport;
 pub(crate) use parts::Part;
 pub use realise::Realised;
 pub use weights::{RealisationWeights, WeightError};
 
 use correspondence::correspond;
 
-use crate::paint::{AngleGrid, CarPaint, Coat, ColorTable, FlakeTexture, Lobe};
+use crate::paint::{AngleGrid, CarPaint, Clustering, Coat, ColorTable, FlakeTexture, Lobe};
 use crate::transport::TransportError;
 
 /// Fewest and most paints of a blend.
@@ -65,6 +73,9 @@ pub(crate) struct BlendedPaint {
     pub diffuse: [f64; 3],
     pub lobes: Vec<Lobe>,
     pub color_table: ColorTable,
+    pub origin: Origin,
+    /// How its flakes were clustered, where that is known.
+    pub clustering: Option<Clustering>,
 }
 
 /// Corresponding clusters of all paints on their common angles.
@@ -127,6 +138,20 @@ impl Blend {
         settings: &BlendSettings,
         progress: &(dyn Fn(f32) + Sync),
     ) -> Result<Self, BlendError> {
+        Self::on(ingredients, settings, None, progress)
+    }
+
+    /// The same on these angles alone, in place of the paints' common ones: for a look at a few slices.
+    ///
+    /// # Errors
+    ///
+    /// As [`Blend::new`].
+    pub fn on(
+        ingredients: &[Ingredient<'_>],
+        settings: &BlendSettings,
+        angles: Option<(AngleGrid, AngleGrid)>,
+        progress: &(dyn Fn(f32) + Sync),
+    ) -> Result<Self, BlendError> {
         if !PAINTS.contains(&ingredients.len()) {
             return Err(BlendError::Paints(ingredients.len()));
         }
@@ -141,7 +166,7 @@ impl Blend {
             asked[k] = place;
         }
         let ordered: Vec<&CarPaint> = canonical.iter().map(|&k| ingredients[k].paint).collect();
-        let (flakes, report) = correspond(&ordered, settings, progress)?;
+        let (flakes, report) = correspond(&ordered, settings, angles, progress)?;
         let (chi_h, chi_d) = base::common_table_grid(&ordered)?;
         let paints = canonical
             .iter()
@@ -154,6 +179,8 @@ impl Blend {
                     diffuse: paint.diffuse,
                     lobes: paint.lobes.clone(),
                     color_table: paint.color_table.on(&chi_h, &chi_d),
+                    origin: Origin::default(),
+                    clustering: None,
                 }
             })
             .collect();
@@ -198,10 +225,62 @@ impl Blend {
             .map(|&k| (self.paints[k].name.as_str(), self.paints[k].hash.as_str()))
     }
 
+    /// The same blend with what is known of its paints, in the order asked for.
+    #[must_use]
+    pub fn with_origins(mut self, origins: impl IntoIterator<Item = Origin>) -> Self {
+        for (&place, origin) in self.asked.iter().zip(origins) {
+            self.paints[place].origin = origin;
+        }
+        self
+    }
+
+    /// What is known of each paint, in the order asked for.
+    pub fn origins(&self) -> impl Iterator<Item = Origin> + Clone {
+        self.asked.iter().map(|&place| self.paints[place].origin)
+    }
+
+    /// Which paint in the order asked for stands at this place in the order of content hashes.
+    #[must_use]
+    pub fn asked_at(&self, place: usize) -> Option<usize> {
+        self.asked.iter().position(|&own| own == place)
+    }
+
+    /// Place in hash order of the paint that was asked for `k`-th.
+    ///
+    /// # Panics
+    ///
+    /// When there are not so many.
+    #[must_use]
+    pub fn place(&self, k: usize) -> usize {
+        self.asked[k]
+    }
+
     /// How the correspondence was found and how good it is.
     #[must_use]
     pub const fn report(&self) -> &CorrespondenceReport {
         &self.report
+    }
+
+    /// The same blend with what was measured of it against exact transport, and with how the flakes of each paint, in the
+    /// order asked for, were clustered.
+    #[must_use]
+    pub fn with_accuracy(
+        mut self,
+        against_exact: Vec<BlendDeviation>,
+        clusterings: &[Option<Clustering>],
+    ) -> Self {
+        self.report.against_exact = against_exact;
+        for (&place, clustering) in self.asked.iter().zip(clusterings) {
+            self.paints[place].clustering.clone_from(clustering);
+        }
+        self
+    }
+
+    /// How the flakes of each paint were clustered, in the order asked for, where that is known.
+    pub fn clusterings(&self) -> impl Iterator<Item = Option<&Clustering>> + Clone {
+        self.asked
+            .iter()
+            .map(|&k| self.paints[k].clustering.as_ref())
     }
 
     /// Settings the correspondence was found with.

@@ -78,15 +78,21 @@ impl RealisationWeights {
         }
     }
 
-    pub(super) fn base(&self) -> &[f64] {
+    /// Weights of the base.
+    #[must_use]
+    pub fn base(&self) -> &[f64] {
         self.base.as_deref().unwrap_or(&self.weights)
     }
 
-    pub(super) fn flake_lightness(&self) -> &[f64] {
+    /// Weights of the flakes' lightness.
+    #[must_use]
+    pub fn flake_lightness(&self) -> &[f64] {
         self.flake_lightness.as_deref().unwrap_or(&self.weights)
     }
 
-    pub(super) fn flake_color(&self) -> &[f64] {
+    /// Weights of the flakes' color.
+    #[must_use]
+    pub fn flake_color(&self) -> &[f64] {
         self.flake_color.as_deref().unwrap_or(&self.weights)
     }
 

@@ -10,7 +10,9 @@ use super::ingest::ReadingArgs;
 use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
-use crate::workshop::{WorkshopError, blend_paints, open_paint};
+use crate::accuracy::blend_error;
+use crate::blend::PAINTS;
+use crate::workshop::{WorkshopError, blend_paints, describe_blend, open_paint};
 
 /// Find how the flakes of 2 to 5 paints become one another, and keep it as a .blend.
 ///
@@ -33,10 +35,19 @@ pub struct Blend {
 impl Blend {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
         let options = ReadingArgs::default().options(None, &self.profile)?;
+        if !PAINTS.contains(&self.inputs.len()) {
+            let problem = format!(
+                "{} paints given, a blend takes {} to {}",
+                self.inputs.len(),
+                PAINTS.start(),
+                PAINTS.end()
+            );
+            return Err(WorkshopError::usage("INPUT", problem));
+        }
         let start = Instant::now();
         let mut paints = Vec::with_capacity(self.inputs.len());
         for input in &self.inputs {
-            let progress = Progress::new(&format!("reading {input}"));
+            let progress = Progress::reading(input);
             paints.push(open_paint(input, &options, &|share| progress.at(share))?);
         }
         let read = start.elapsed();
@@ -59,24 +70,26 @@ impl Blend {
             });
             output::replace(timings, seconds.to_string().as_bytes())?;
         }
-        let report = made.blend.report();
+        let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
         if json {
-            let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
+            let correspondence = &describe_blend(&made.blend)["correspondence"];
             return output::print_json(
-                &json!({ "out": self.out, "paints": names, "correspondence": report, "notes": made.notes }),
+                &json!({ "out": self.out, "paints": names, "profile": options.profile.name(),
+                    "correspondence": correspondence, "error": blend_error(&made.blend), "notes": made.notes }),
             );
         }
         for note in &made.notes {
             eprintln!("note: {note}");
         }
-        let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
+        let report = made.blend.report();
         eprintln!(
-            "{}: {} · {} slices, {} clusters, mean transport {:.2} Lab",
+            "{}: {} · {} slices, {} clusters, mean transport {:.2}, error {:.3} Lab",
             self.out.display(),
             names.join(" + "),
             report.slices,
             report.clusters,
-            report.mean_cost
+            report.mean_cost,
+            blend_error(&made.blend).lab
         );
         Ok(())
     }

@@ -40,14 +40,8 @@ struct Common {
     /// Print one JSON object on stdout; progress and errors stay on stderr.
     #[arg(long, global = true)]
     json: bool,
-    /// Threads to compute with. Results are the same with any number.
-    #[arg(
-        long,
-        global = true,
-        value_name = "N",
-        env = "RAYON_NUM_THREADS",
-        hide_env = true
-    )]
+    /// Threads to compute with, in place of RAYON_NUM_THREADS, in place of all. Results are the same with any number.
+    #[arg(long, global = true, value_name = "N")]
     threads: Option<usize>,
 }
 
@@ -99,6 +93,7 @@ fn start(cli: Cli) -> Result<(), WorkshopError> {
         ));
     }
     rayon::ThreadPoolBuilder::new()
+        // 0 leaves it to rayon, which reads RAYON_NUM_THREADS, where 0 and nothing mean all.
         .num_threads(cli.common.threads.unwrap_or(0))
         .build_global()
         .map_err(WorkshopError::internal)?;

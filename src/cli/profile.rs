@@ -1,31 +1,63 @@
 //! Which accuracy profile a command computes with.
 
+use std::path::Path;
+
 use clap::Args;
 
-use crate::accuracy::Profile;
-use crate::workshop::WorkshopError;
+use crate::accuracy::{Knobs, Profile, ProfileError};
+use crate::paint::Limits;
+use crate::workshop::{WorkshopError, read};
 
-/// The profile, by name or by knobs.
+/// The profile, by name, by file and by knobs; later ones win.
 #[derive(Args, Clone, Debug, Default)]
 pub struct ProfileArgs {
-    /// Accuracy profile: draft, standard or reference.
-    #[arg(long, value_name = "P", default_value = "standard")]
+    /// Accuracy profile: draft, standard, reference, or a JSON file of knobs.
+    #[arg(long, value_name = "NAME|FILE.json", default_value = "standard")]
     pub profile: String,
+    /// Turn one knob of the profile, such as clusters=100; may be repeated. Knobs: clusters, box_rule, angle_step,
+    /// transport, epsilon, cost, order, precision, draw, samples_per_pixel.
+    #[arg(long = "knob", value_name = "NAME=VALUE")]
+    pub knobs: Vec<Knobs>,
     /// Clusters per flake slice, 1 to 4096, in place of the profile's.
     #[arg(long, value_name = "N")]
-    pub clusters: Option<usize>,
+    pub clusters: Option<u32>,
 }
 
 impl ProfileArgs {
+    /// The knobs these arguments turn.
+    pub fn knobs(&self) -> Result<Knobs, WorkshopError> {
+        let wrong = |e: ProfileError| WorkshopError::usage("--profile", e);
+        let is_file = Path::new(&self.profile)
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+        let mut knobs: Knobs = if is_file {
+            let bytes = read(Path::new(&self.profile), &Limits::default())?;
+            let mut reader = serde_json::Deserializer::from_slice(&bytes);
+            Knobs::of_name_or_object(&mut reader)
+                .map_err(|e| WorkshopError::input(&self.profile, e))?
+        } else {
+            self.profile.parse().map_err(wrong)?
+        };
+        for turned in &self.knobs {
+            knobs = turned.over(&knobs).map_err(wrong)?;
+        }
+        knobs.clusters = self.clusters.or(knobs.clusters);
+        Ok(knobs)
+    }
+
     /// The profile these arguments mean.
     pub fn profile(&self) -> Result<Profile, WorkshopError> {
-        let profile =
-            Profile::named(&self.profile).map_err(|e| WorkshopError::usage("--profile", e))?;
-        match self.clusters {
-            None => Ok(profile),
-            Some(clusters) => profile
-                .with_clusters(clusters)
-                .map_err(|e| WorkshopError::usage("--clusters", e)),
-        }
+        self.knobs()?.profile().map_err(|e| {
+            let option = match (e.knob(), self.clusters) {
+                (Some("clusters"), Some(_)) => "--clusters",
+                _ => "--profile",
+            };
+            WorkshopError::usage(option, e)
+        })
+    }
+
+    /// Clusters asked for by number.
+    pub fn asked_clusters(&self) -> Result<Option<usize>, WorkshopError> {
+        Ok(self.knobs()?.clusters.map(|n| n as usize))
     }
 }

@@ -24,6 +24,11 @@ impl Progress {
         Self { bar }
     }
 
+    /// A bar for reading an input, which for a measurement is a fit.
+    pub fn reading(input: &str) -> Self {
+        Self::new(&format!("reading {input}"))
+    }
+
     /// Moves the bar to a share of 0 to 1.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a bar of a thousand steps
     pub fn at(&self, share: f32) {

@@ -147,6 +147,7 @@ pub(super) fn blend_document(
             numbers::ANGLES,
             numbers::TEXTURES,
             numbers::REPORT,
+            numbers::PROVENANCE,
         ]),
     };
     Ok(serde_json::to_vec_pretty(&document)?)

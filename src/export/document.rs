@@ -154,6 +154,7 @@ pub(super) fn document(
             numbers::TEXTURES,
             numbers::INVERSE_CDF,
             numbers::REPORT,
+            numbers::PROVENANCE,
         ]),
         shader_source: matches!(carrier, Carrier::Inline).then_some(super::SHADER),
     };

@@ -6,7 +6,7 @@ use super::About;
 use super::gltf_brdf::GltfMaterial;
 use super::gltf_fit::LossReport;
 use super::gltf_mesh::REPEATS;
-use super::numbers::{ANGLES, ANY, GRAIN, Number, PAINT, REPORT, documentation};
+use super::numbers::{ANGLES, ANY, GRAIN, Number, PAINT, PROVENANCE, REPORT, documentation};
 use crate::paint::{CarPaint, RandomTexture, cell_spacing};
 
 /// The material and the extensions it uses; `textures` are those of F0 and of the normals.
@@ -109,7 +109,7 @@ pub(super) fn extras(
         "ball_radius_m": radius,
         "loss": loss,
         "report": about.report,
-        "documentation": documentation(&[PAINT, ANGLES, GRAIN, EXTRAS, REPORT]),
+        "documentation": documentation(&[PAINT, ANGLES, GRAIN, EXTRAS, REPORT, PROVENANCE]),
     })
 }
 

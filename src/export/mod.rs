@@ -28,6 +28,7 @@ mod made_up;
 mod material_json;
 mod numbers;
 mod png_file;
+mod rounding;
 mod textures;
 
 pub use alias::{AliasEntry, alias_table};
@@ -41,6 +42,7 @@ pub use inverse_cdf::{InverseCdf, inverse_cdf};
 pub use material_json::material_json;
 #[cfg(test)]
 pub(crate) use numbers::tests::assert_documented;
+pub use rounding::Rounding;
 
 use serde::{Deserialize, Serialize};
 

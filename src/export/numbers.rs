@@ -99,8 +99,41 @@ pub(super) const REPORT: &[Number] = &[
     ("report.correspondence.clusters", "1", (0.0, ANY), "clusters of all slices"),
     ("report.correspondence.mean_cost", "CIELAB", (0.0, ANY), "mean transport cost of a slice, summed over the paints: the distance that flakes move, or its square where blended so"),
     ("report.correspondence.largest_gap", "CIELAB", (0.0, ANY), "largest gap of a slice between its plan's cost and the dual bound: no plan is further from optimal"),
-    ("report.correspondence.mixed[]", "1", (0.0, 4.0), "paints (0 is the least of report.hashes in alphabetical order) whose slices are mixtures, as their angles differ from the common grid"),
-    ("report.correspondence.without_flakes[]", "1", (0.0, 4.0), "paints, counted likewise, that have no flakes and count as black ones"),
+    ("report.correspondence.order[]", "1", (0.0, 4.0), "order in which the paints were joined; 0 is the least of report.hashes in alphabetical order"),
+    ("report.correspondence.pairs[].paints[]", "1", (0.0, 4.0), "the two paints, counted as in order"),
+    ("report.correspondence.pairs[].mean_cost", "CIELAB", (0.0, ANY), "mean distance between corresponding clusters of the pair, over all slices"),
+    ("report.correspondence.pairs[].mean_gap", "CIELAB", (0.0, ANY), "mean excess over the best that the pair alone could have (its dual bound), over the slices that were checked"),
+    ("report.correspondence.pairs[].largest_gap", "CIELAB", (0.0, ANY), "largest such excess"),
+    ("report.correspondence.pairs[].checked", "1", (0.0, ANY), "slices that were checked"),
+    ("report.correspondence.against_exact[].aspecular_deg", "degree", (-90.0, 180.0), "aspecular angle of a geometry, light at 45 degrees"),
+    ("report.correspondence.against_exact[].delta_e_2000", "CIEDE2000", (0.0, ANY), "difference of the mean color at equal weights from the blend by exact transport"),
+    ("report.correspondence.against_exact[].sparkle", "1", (-ANY, ANY), "relative difference of the 99.9th percentile of the flakes' luminance likewise"),
+    ("report.correspondence.mixed[].place", "1", (0.0, 4.0), "place in report.paints, from 0, of a paint whose slices are mixtures, as its angles differ from the common grid"),
+    ("report.correspondence.without_flakes[].place", "1", (0.0, 4.0), "place of a paint that has no flakes and counts as black ones"),
+    ("report.correspondence.reduced[].place", "1", (0.0, 4.0), "place of a paint whose clusters were reduced"),
+    ("report.correspondence.reduced[].from", "1", (1.0, ANY), "clusters of its widest slice before"),
+    ("report.correspondence.reduced[].to", "1", (1.0, ANY), "clusters of its widest slice after"),
+    ("report.accuracy.error.lab", "CIELAB", (0.0, ANY), "distance by which the flakes' colors are misplaced against the reference profile: sum of the known terms"),
+    ("report.accuracy.error.terms[].lab", "CIELAB", (0.0, ANY), "one term of it, null where it is not known; `how` says how it is"),
+    ("report.accuracy.writing.rounding_w1", "CIELAB", (0.0, ANY), "bound on the distance W1 between the paint's flakes and those of the textures, worst of the slices at the instrument geometries"),
+    ("report.accuracy.writing.instrument[]", "CIEDE2000", (0.0, ANY), "difference of the mean color by the textures, per instrument geometry"),
+    ("report.accuracy.writing.sparkle[]", "1", (-ANY, ANY), "relative change of the 99.9th percentile of luminance by the textures, per instrument geometry"),
+    ("report.accuracy.writing.inverse_cdf_loss", "1", (0.0, 1.0), "largest share of draws that show another cluster than they should, where flakes are drawn by the 500 steps"),
+    ("report.accuracy.sparkle[].aspecular_deg", "degree", (-90.0, 180.0), "aspecular angle of a geometry, light at 45 degrees"),
+    ("report.accuracy.sparkle[].luminance[]", "1", (-ANY, ANY), "50th, 90th, 99th and 99.9th percentile of the flakes' luminance factor; 1 is the perfect diffuser"),
+    ("report.accuracy.sparkle[].lit_per_mm2", "1/mm^2", (0.0, ANY), "flakes that shine, per square millimetre"),
+];
+
+/// The realisation that a paint's provenance tells of.
+#[rustfmt::skip]
+pub(super) const PROVENANCE: &[Number] = &[
+    ("provenance.realisation.base[]", "1", (-1e12, 1e12), "weight of each paint's coat, diffuse, lobes and color table"),
+    ("provenance.realisation.flake_lightness[]", "1", (-1e12, 1e12), "weight of the lightness of each paint's flakes, with grain and lifetime"),
+    ("provenance.realisation.flake_color[]", "1", (-1e12, 1e12), "weight of a and b of each paint's flakes"),
+    ("provenance.realisation.flake_saturation", "1", (-1e12, 1e12), "factor on a and b of the flakes"),
+    ("provenance.realisation.clamps[].count", "1", (1.0, ANY), "numbers of `field` that were beyond `bound`"),
+    ("provenance.realisation.clamps[].of", "1", (1.0, ANY), "numbers of `field` in all"),
+    ("provenance.realisation.clamps[].worst", "as the field", (0.0, ANY), "how far the worst of them was beyond the bound"),
 ];
 
 #[cfg(test)]

@@ -394,15 +394,11 @@ impl Textures {
         self.slice_losses.reserve(slices);
         for k in 0..slices {
             let range = flakes.offsets[k] as usize..flakes.offsets[k + 1] as usize;
-            let mut texels = index[k / blocks * width + k % blocks * steps..].iter_mut();
-            let loss = inverse_cdf::append(
+            let first = k / blocks * width + k % blocks * steps;
+            let loss = inverse_cdf::write(
                 &flakes.probability[range.clone()],
                 &luminances[range],
-                |cluster| {
-                    if let (Some(texel), Ok(cluster)) = (texels.next(), u16::try_from(cluster)) {
-                        *texel = cluster;
-                    }
-                },
+                &mut index[first..first + steps],
             );
             #[allow(clippy::cast_possible_truncation)] // stated to seven digits
             self.slice_losses.push(loss.map(|v| v as f32));
@@ -512,13 +508,13 @@ fn rounding(half: &[f16], exact: &[f32]) -> f32 {
 }
 
 /// The range of all corners, in 255 steps an axis.
-struct Range8 {
-    scale: [f32; 3],
-    offset: [f32; 3],
+pub(super) struct Range8 {
+    pub(super) scale: [f32; 3],
+    pub(super) offset: [f32; 3],
 }
 
 impl Range8 {
-    fn of(lower: &[[f32; 3]], upper: &[[f32; 3]]) -> Self {
+    pub(super) fn of(lower: &[[f32; 3]], upper: &[[f32; 3]]) -> Self {
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];
         for corner in lower.iter().chain(upper) {

@@ -57,21 +57,41 @@ pub(super) fn moments(members: &[Texel], light: &[[f32; 4]], more: LinearRgb) ->
     }
     let count = members.len() as f64;
     let mean: [f64; 3] = std::array::from_fn(|k| origin[k] + first[k] / count);
+    let variance =
+        std::array::from_fn(|k| (second[k] / count - (first[k] / count).powi(2)).max(0.0));
+    let light = std::array::from_fn(|k| sum[k] / count + more[k]);
+    of_moments(mean, variance, light)
+}
+
+/// The box of this mean and variance in Lab whose middle is moved until its mean in linear light is `light`.
+pub(super) fn of_moments(mean: [f64; 3], variance: [f64; 3], light: LinearRgb) -> Corners {
+    // A box must not reach beyond the bounds, wherever its mean moves it.
     let half = std::array::from_fn(|k| {
-        let variance = (second[k] / count - (first[k] / count).powi(2)).max(0.0);
-        // A box must not reach beyond the bounds, wherever its mean moves it.
-        (3.0 * variance)
+        (3.0 * variance[k])
             .sqrt()
             .min((MAX_LAB - mean[k].abs()).max(0.0))
     });
-    let center = center_of_mean(
-        half,
-        std::array::from_fn(|k| sum[k] / count + more[k]),
-        mean,
-    );
+    let center = center_of_mean(half, light, mean);
     let bound = MAX_LAB as f32;
     let corner = |sign: f64| {
         std::array::from_fn(|k| ((center[k] + sign * half[k]) as f32).clamp(-bound, bound))
     };
     (corner(-1.0), corner(1.0))
+}
+
+/// Root of the mean squared distance between members and independent colors of their box, Lab units.
+pub(super) fn reach(members: &[Texel], lower: [f32; 3], upper: [f32; 3]) -> f64 {
+    let mut squared = 0.0_f64;
+    for k in 0..3 {
+        let (center, half) = (
+            f32::midpoint(lower[k], upper[k]),
+            f64::from(upper[k] - lower[k]) / 2.0,
+        );
+        let sum: f32 = members
+            .iter()
+            .map(|texel| (texel[k] - center) * (texel[k] - center))
+            .sum();
+        squared += f64::from(sum) / members.len() as f64 + half * half / 3.0;
+    }
+    squared.sqrt()
 }

@@ -12,9 +12,10 @@ use rayon::prelude::*;
 use super::clusters::{ClusterSettings, Clusterer, NoTexel, SliceClusters};
 use super::grain::{Luminance, grain_texels};
 use super::lifetime::{Lifetime, comonotone, correlation, lifetime};
+use super::thinned::Thinned;
 use crate::color::luminance;
 use crate::measurement::{FlakePictures, PackageError, SliceRoom};
-use crate::paint::{Clustering, FlakeTexture, Flakes};
+use crate::paint::{Clustering, FlakeTexture, Flakes, Percentiles};
 
 /// Most texels of a slice that grain and lifetime look at: whole rows from the top.
 const PROBED_TEXELS: usize = 1 << 18;
@@ -85,6 +86,19 @@ pub fn fit_flakes(
     if !(1..=4096).contains(&settings.clusters) {
         return Err(FlakeFitError::Clusters(settings.clusters));
     }
+    if settings.angle_step > 1 {
+        let every = ClusterSettings {
+            angle_step: 1,
+            ..*settings
+        };
+        let mut fitted = fit_flakes(
+            &Thinned::new(pictures, settings.angle_step),
+            &every,
+            progress,
+        )?;
+        fitted.clustering.angle_step = settings.angle_step;
+        return Ok(fitted);
+    }
     let (slices, columns) = (pictures.slices(), pictures.theta_d().len());
     let column = columns.min(3) - 1;
     let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
@@ -125,7 +139,11 @@ pub fn fit_flakes(
     let clustering = Clustering {
         clusters: settings.clusters,
         box_rule: settings.box_rule.name().to_owned(),
-        w1: None,
+        angle_step: 1,
+        w1_bound: Some(Percentiles::of(
+            fitted.iter().map(|s| s.clusters.w1_bound).collect(),
+        )),
+        error: None,
     };
     Ok(FittedFlakes {
         flakes,

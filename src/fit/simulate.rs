@@ -89,7 +89,7 @@ pub fn simulate_flakes(
     settings: &ClusterSettings,
     progress: Progress,
 ) -> Result<FittedFlakes, FlakeFitError> {
-    fit_flakes(&Patch::new(base, recipe)?, settings, progress)
+    fit_flakes(&SimulatedPatch::new(base, recipe)?, settings, progress)
 }
 
 /// One flake: its normal, and its color with gain.
@@ -99,9 +99,9 @@ struct Flake {
     color: LinearRgb,
 }
 
-/// A patch of paint with every flake in its place.
+/// A patch of paint with every flake in its place, and the pictures of it.
 #[derive(Debug)]
-struct Patch {
+pub struct SimulatedPatch {
     theta_h: AngleGrid,
     theta_d: AngleGrid,
     texel_um: f64,
@@ -160,8 +160,13 @@ impl FlakeRecipe {
     }
 }
 
-impl Patch {
-    fn new(base: &CarPaint, recipe: &FlakeRecipe) -> Result<Self, FlakeFitError> {
+impl SimulatedPatch {
+    /// Scatters flakes over a patch of this paint.
+    ///
+    /// # Errors
+    ///
+    /// [`FlakeFitError::Recipe`] for a recipe out of range.
+    pub fn new(base: &CarPaint, recipe: &FlakeRecipe) -> Result<Self, FlakeFitError> {
         recipe.check()?;
         let mut random = Random(recipe.seed ^ 0x5bd1_e995_9d1b_54a5);
         let side = f64::from(recipe.texels);
@@ -299,7 +304,7 @@ fn topmost(discs: &[(f64, f64, f64)], side: usize) -> (Vec<(u32, f32)>, Vec<u32>
     (shows, starts)
 }
 
-impl FlakePictures for Patch {
+impl FlakePictures for SimulatedPatch {
     fn theta_h(&self) -> &AngleGrid {
         &self.theta_h
     }
@@ -426,7 +431,7 @@ mod tests {
 
     #[test]
     fn few_texels_shine_many_times_brighter_than_the_mean() {
-        let patch = Patch::new(&silver(), &SMALL).expect("in range");
+        let patch = SimulatedPatch::new(&silver(), &SMALL).expect("in range");
         let reflections = patch.reflections(12.0, 10.0);
         let mut light: Vec<f64> = (0..patch.starts.len() - 1)
             .map(|t| luminance(patch.texel(t, &reflections)))

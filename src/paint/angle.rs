@@ -91,6 +91,30 @@ impl AngleGrid {
         self.degrees.len()
     }
 
+    /// Indices of every `step`-th angle from the first on, and of the last, so that the range stays what it was.
+    #[must_use]
+    pub fn every(&self, step: usize) -> Vec<usize> {
+        let last = self.degrees.len() - 1;
+        let mut kept: Vec<usize> = (0..=last).step_by(step.max(1)).collect();
+        if kept.last() != Some(&last) {
+            kept.push(last);
+        }
+        kept
+    }
+
+    /// The angles at these indices, which ascend strictly.
+    ///
+    /// # Panics
+    ///
+    /// When an index is no angle of the grid, or there is none.
+    #[must_use]
+    pub fn at(&self, indices: &[usize]) -> Self {
+        assert!(!indices.is_empty(), "a grid has an angle");
+        Self {
+            degrees: indices.iter().map(|&k| self.degrees[k]).collect(),
+        }
+    }
+
     /// Finds an angle in degrees between its neighbours; outside the range the border angle holds.
     #[must_use]
     pub fn bracket(&self, angle_deg: f64) -> Bracket {

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::container::{Container, ContainerError, Writer};
 use super::energy::EnergyCertificate;
 use super::{
-    AngleGrid, CarPaint, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes, Limits, Lobe,
-    PaintError,
+    AngleGrid, CarPaint, ClusteringError, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes,
+    Limits, Lobe, PaintError, Percentiles, ReadingResiduals, Realisation,
 };
 use crate::color::{Lab, LinearRgb};
 
@@ -25,6 +25,9 @@ pub struct Provenance {
     /// Whether the flakes were simulated instead of measured.
     #[serde(default)]
     pub simulated_flakes: bool,
+    /// Of which blend it is a realisation, where it is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub realisation: Option<Realisation>,
     /// What else the source said about itself: license, instrument, maker, color code, date.
     #[serde(default, skip_serializing_if = "std::collections::BTreeMap::is_empty")]
     pub notes: std::collections::BTreeMap<String, String>,
@@ -38,9 +41,25 @@ pub struct Clustering {
     pub clusters: usize,
     /// Rule that boxes follow: `tight` or `moments`.
     pub box_rule: String,
-    /// Median and worst distance W1 between a slice's pixels and its clusters, in Lab, where it was measured.
+    /// Of the measured angles every so many-th was fitted, on either grid.
+    #[serde(default = "every_angle", skip_serializing_if = "is_every_angle")]
+    pub angle_step: usize,
+    /// Distance W1 in Lab between a slice's pixels and its clusters, bounded from above over all fitted slices: what
+    /// moving every pixel to a color of its own cluster's box would cost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub w1: Option<[f64; 2]>,
+    pub w1_bound: Option<Percentiles>,
+    /// How far the clusters are from the pixels, where it was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<ClusteringError>,
+}
+
+fn every_angle() -> usize {
+    1
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+fn is_every_angle(step: &usize) -> bool {
+    *step == 1
 }
 
 /// A paint and what is known about it.
@@ -56,6 +75,8 @@ pub struct PaintFile {
     pub clustering: Option<Clustering>,
     /// How well the base fits its measurement, where it was fitted.
     pub residuals: Option<FitResiduals>,
+    /// How far the paint is from the multi-angle readings that came with its measurement, where some did.
+    pub readings: Option<ReadingResiduals>,
     /// Energy certificate.
     pub energy: EnergyCertificate,
     /// What the user should know: dirty data, averaged azimuths, energy above 1, clamped values.
@@ -81,6 +102,8 @@ struct Header {
     physical: PhysicalHeader,
     clustering: Option<Clustering>,
     residuals: Option<FitResiduals>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    readings: Option<ReadingResiduals>,
     energy: EnergyCertificate,
     warnings: Vec<String>,
 }
@@ -175,6 +198,7 @@ impl PaintFile {
             physical: PhysicalHeader::of(&self.paint),
             clustering: self.clustering.clone(),
             residuals: self.residuals.clone(),
+            readings: self.readings.clone(),
             energy: self.energy.clone(),
             warnings: self.warnings.clone(),
         };
@@ -230,6 +254,7 @@ impl PaintFile {
             paint,
             clustering: header.clustering,
             residuals: header.residuals,
+            readings: header.readings,
             energy: header.energy,
             warnings: header.warnings,
         })

@@ -79,6 +79,41 @@ impl Flakes {
         }
     }
 
+    /// The slices at these grid indices of θh and θd alone, as they are.
+    ///
+    /// # Panics
+    ///
+    /// When an index is outside the grid.
+    #[must_use]
+    pub fn only(&self, theta_h: &[usize], theta_d: &[usize]) -> Self {
+        let mut kept = Self {
+            theta_h: self.theta_h.at(theta_h),
+            theta_d: self.theta_d.at(theta_d),
+            offsets: vec![0],
+            probability: Vec::new(),
+            lower: Vec::new(),
+            upper: Vec::new(),
+            texture: self.texture,
+        };
+        for &h in theta_h {
+            for &d in theta_d {
+                let slice = self.slice(h, d);
+                kept.probability.extend_from_slice(slice.probability);
+                kept.lower.extend_from_slice(slice.lower);
+                kept.upper.extend_from_slice(slice.upper);
+                #[allow(clippy::cast_possible_truncation)] // no more than there were
+                kept.offsets.push(kept.probability.len() as u32);
+            }
+        }
+        kept
+    }
+
+    /// Every `step`-th angle of either grid, and the last.
+    #[must_use]
+    pub fn thinned(&self, step: usize) -> Self {
+        self.only(&self.theta_h.every(step), &self.theta_d.every(step))
+    }
+
     /// How many slices.
     #[must_use]
     pub fn slices(&self) -> usize {

@@ -20,8 +20,10 @@ mod direction;
 mod energy;
 mod file;
 mod flakes;
+mod lightness;
 mod limits;
 mod lobe;
+mod realisation;
 mod reflectance;
 mod residuals;
 mod sparkle;
@@ -38,10 +40,15 @@ pub use direction::{ASPECULAR_DEG, Direction, HalfAngles, half_angles, instrumen
 pub use energy::{EnergyCertificate, certify};
 pub use file::{Clustering, PaintFile, PaintFileError, Provenance};
 pub use flakes::{FlakeTexture, Flakes, Slice};
+pub use lightness::LightnessMixture;
 pub use limits::Limits;
 pub use lobe::Lobe;
+pub use realisation::{Clamp, Realisation};
 pub use reflectance::{Chi, Reflectance, Terms};
-pub use residuals::{FitResiduals, InstrumentError, LuminanceError};
+pub use residuals::{
+    ClusteringError, FitResiduals, InstrumentError, LuminanceError, Percentiles, ReadingError,
+    ReadingResiduals,
+};
 pub use sparkle::{FlakeSampler, TexelDraw, cumulative};
 pub use validate::{MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError};
 

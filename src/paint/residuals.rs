@@ -30,6 +30,32 @@ pub struct LuminanceError {
     pub floor_p90: f64,
 }
 
+/// How far a paint is from the readings that came with its measurement, flakes at their mean.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReadingResiduals {
+    /// Angle of the light from the normal, degrees.
+    pub illumination_deg: f64,
+    /// Angle by angle, in the order of the readings.
+    pub rows: Vec<ReadingError>,
+    /// Median CIEDE2000.
+    pub median: f64,
+    /// Largest CIEDE2000.
+    pub worst: f64,
+    /// Whether the readings were made under another light or observer than D65 and 2°, and compared as they are.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub approximate: bool,
+}
+
+/// Color error against one reading.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReadingError {
+    /// Aspecular angle, degrees.
+    pub aspecular_deg: f64,
+    /// CIEDE2000 between paint and reading.
+    pub delta_e_2000: f64,
+}
+
 /// Color error at one instrument geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InstrumentError {
@@ -39,4 +65,59 @@ pub struct InstrumentError {
     pub fit: f64,
     /// CIEDE2000 of the floor.
     pub floor: f64,
+}
+
+/// How far the clusters of a paint's flakes are from the pixels they were made of.
+///
+/// Compared on slices that were read again: those around the six instrument geometries, and some spread evenly over
+/// the measured grid. A measured slice that was not fitted is compared with the mixture of its fitted neighbours.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClusteringError {
+    /// Slices that were compared.
+    pub slices: usize,
+    /// Slices that were measured.
+    pub of: usize,
+    /// Distance W1 of the lightnesses, Lab units, exact; what W1 in all three axes is at least.
+    pub lightness_w1: Percentiles,
+    /// Relative error of the mean luminance, over the lit slices among them.
+    pub mean_luminance: Percentiles,
+    /// Relative error of the 99.9th percentile of luminance, over the lit slices among them.
+    pub sparkle: Percentiles,
+    /// CIEDE2000 at the six instrument geometries between the means of clusters and pixels, base included.
+    pub instrument: [f64; 6],
+}
+
+/// A list of errors in three numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Percentiles {
+    /// Half of them are no larger.
+    pub median: f64,
+    /// Nine of ten are no larger.
+    pub p90: f64,
+    /// None is larger.
+    pub worst: f64,
+}
+
+impl Percentiles {
+    /// Of these values; all 0 where there is none.
+    #[must_use]
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            #[allow(
+                clippy::cast_precision_loss,
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss
+            )] // ranks in a list
+            let rank = (share * (values.len().max(1) - 1) as f64).round() as usize;
+            values.get(rank).copied().unwrap_or(0.0)
+        };
+        Self {
+            median: at(0.5),
+            p90: at(0.9),
+            worst: at(1.0),
+        }
+    }
 }

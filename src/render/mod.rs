@@ -17,6 +17,7 @@ mod lanes;
 mod lens;
 mod light_grid;
 mod light_table;
+mod noise;
 mod optics;
 mod points;
 mod scene;
@@ -36,6 +37,7 @@ pub use effects::{Effect, EffectPlan, PlannedEffect};
 pub use environment::Environment;
 pub use environment_file::EnvironmentError;
 pub use film::{Film, FilmError};
+pub use noise::SamplingError;
 pub use scene::{Background, Camera, DirectionalLight, Scene};
 pub use surface::Shape;
 pub use texels::texels;
@@ -71,6 +73,8 @@ pub struct RenderReport {
     pub plan: EffectPlan,
     /// Samples per pixel.
     pub samples_per_pixel: u32,
+    /// What the samples leave to chance.
+    pub sampling: SamplingError,
     /// Paint seen by a pixel in the middle of the picture, millimetres.
     pub pixel_mm: f64,
 }
@@ -101,7 +105,7 @@ pub fn render(
     let rows: Vec<Vec<vector::Vec3>> = (0..height)
         .into_par_iter()
         .map(|y| {
-            let row = (0..width).map(|x| shader.pixel(x, y)).collect();
+            let row = (0..width).map(|x| shader.pixel(x, y, scene.seed)).collect();
             let rows = done.fetch_add(1, Ordering::Relaxed) + 1;
             #[allow(clippy::cast_precision_loss)]
             progress(rows as f32 / height as f32);
@@ -110,11 +114,23 @@ pub fn render(
         .collect();
     let film = Film::new(width, height, scene.exposure, rows.concat());
     let report = RenderReport {
+        sampling: noise::sampling_error(&shader, scene, Some(&film)),
         plan,
         samples_per_pixel: scene.samples_per_pixel,
         pixel_mm: pixel_mm(scene),
     };
     Ok(Rendering { film, report })
+}
+
+/// What the samples of a picture will leave to chance, without drawing it: only the pixels that tell are drawn.
+///
+/// # Errors
+///
+/// [`RenderError::Scene`] for a scene that is out of range.
+pub fn sampling(paint: &CarPaint, scene: &Scene) -> Result<SamplingError, RenderError> {
+    scene.validate(&Limits::default())?;
+    let (shader, _) = shade::Shader::new(paint, scene);
+    Ok(noise::sampling_error(&shader, scene, None))
 }
 
 fn pixel_mm(scene: &Scene) -> f64 {
@@ -367,6 +383,29 @@ mod tests {
                 .iter()
                 .all(|p| *p == [0.0; 3])
         );
+    }
+
+    /// The truth is a picture of four thousand samples, whose own chance is a sixteenth.
+    #[test]
+    fn the_stated_chance_of_a_picture_is_its_distance_from_the_truth() {
+        let paint = solid(0.4, Some(Coat::smooth(1.5)));
+        let drawn = |samples| render(&paint, &scene(48, samples), &|_| {}).expect("valid");
+        let (some, truth) = (drawn(8), drawn(2048));
+        let exposure = scene(48, 8).exposure;
+        let errors: Vec<f64> = (some.film.pixels().iter().zip(truth.film.pixels()))
+            .map(|(x, y)| {
+                crate::color::ciede2000(noise::shown(*x, exposure), noise::shown(*y, exposure))
+            })
+            .collect();
+        #[allow(clippy::cast_precision_loss)]
+        let actual = errors.iter().sum::<f64>() / errors.len() as f64;
+        let stated = some.report.sampling;
+        assert_eq!(stated.pixels, 12 * 12);
+        assert!(
+            (0.6..1.6).contains(&(stated.mean_delta_e / actual)),
+            "{stated:?} {actual}"
+        );
+        assert!(truth.report.sampling.mean_delta_e < stated.mean_delta_e / 4.0);
     }
 
     #[test]

@@ -151,19 +151,19 @@ impl<'a> Shader<'a> {
         (shader, plan)
     }
 
-    /// Mean radiance of a pixel.
-    pub(super) fn pixel(&self, x: u32, y: u32) -> Vec3 {
+    /// Mean radiance of a pixel. Another seed looks at the same flakes through other sample points.
+    pub(super) fn pixel(&self, x: u32, y: u32, seed: u32) -> Vec3 {
         match (self.coated, self.texture.is_some()) {
-            (true, true) => self.pixel_of::<true, true>(x, y),
-            (true, false) => self.pixel_of::<true, false>(x, y),
-            (false, true) => self.pixel_of::<false, true>(x, y),
-            (false, false) => self.pixel_of::<false, false>(x, y),
+            (true, true) => self.pixel_of::<true, true>(x, y, seed),
+            (true, false) => self.pixel_of::<true, false>(x, y, seed),
+            (false, true) => self.pixel_of::<false, true>(x, y, seed),
+            (false, false) => self.pixel_of::<false, false>(x, y, seed),
         }
     }
 
-    fn pixel_of<const COATED: bool, const FLAKES: bool>(&self, x: u32, y: u32) -> Vec3 {
+    fn pixel_of<const COATED: bool, const FLAKES: bool>(&self, x: u32, y: u32, seed: u32) -> Vec3 {
         let count = self.scene.samples_per_pixel;
-        let points = Points::of_pixel(x, y, count, self.scene.seed);
+        let points = Points::of_pixel(x, y, count, seed);
         let origin = self.scene.camera.origin;
         let mut sum = [0.0; 3];
         let mut batch = Batch::new();

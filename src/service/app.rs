@@ -80,7 +80,7 @@ pub struct Shelved {
 #[derive(Clone, Debug, Serialize, serde::Deserialize)]
 pub struct BlendOptions {
     /// How accurate.
-    pub accuracy: super::works::Accuracy,
+    pub profile: crate::accuracy::Profile,
     /// Place, in the stored blend, of the paint asked for first, second, …
     pub places: Vec<usize>,
 }

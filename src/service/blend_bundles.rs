@@ -11,7 +11,7 @@ use super::extract::{Address, Query};
 use super::ids;
 use super::problem::{Problem, ProblemDocument};
 use super::realisations::ProfileQuery;
-use super::works::{Accuracy, WorkError};
+use super::works::WorkError;
 
 /// All paints of a blend in one archive.
 ///
@@ -34,13 +34,10 @@ pub async fn bundle(
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let blend = app.blend(&id).await?;
-    let accuracy = Accuracy {
-        profile: query.profile.unwrap_or_default(),
-        clusters: None,
-    };
+    let profile = query.profile.unwrap_or_default().of_query()?;
     let key = ids::key(
         "blend_bundle",
-        &(&blend.id, blend.file.to_string(), accuracy),
+        &(&blend.id, blend.file.to_string(), profile.export),
     );
     let name = format!("{}.zip", blend.id);
     let on = app.clone();
@@ -51,7 +48,7 @@ pub async fn bundle(
         );
         let made = on
             .bench
-            .run(move || works.bundle(&blend.thing, accuracy))
+            .run(move || works.bundle(&blend.thing, &profile))
             .await?;
         let bytes = made.map_err(WorkError::of_query)?;
         counter.increment(1);

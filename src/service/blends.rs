@@ -14,12 +14,13 @@ use super::app::{App, BlendOptions, Shelved};
 use super::documents::BlendDocument;
 use super::extract::{Address, Json, NoQuery};
 use super::ids;
-use super::paints::accuracy;
 use super::problem::{Kind, Problem, ProblemDocument};
+use super::profile::{ProfileDocument, ProfileText};
 use super::runner::{self, Ended, JobDocument, UnderWay};
 use super::waiting::Prefer;
 use super::workbench::CalledOff;
-use super::works::{Accuracy, Preset, Thing};
+use super::works::Thing;
+use crate::accuracy::Profile;
 use crate::paint::PaintFile;
 use crate::store::{BlendRecord, JobKind};
 
@@ -30,8 +31,9 @@ pub struct BlendOrder {
     /// Ids of two to five paints. Weights of a realisation follow this order.
     #[schema(min_items = 2, max_items = 5)]
     paints: Vec<String>,
-    /// Accuracy.
-    profile: Option<Preset>,
+    /// Accuracy: the name of a preset, or an object of knobs.
+    #[schema(value_type = Option<ProfileDocument>)]
+    profile: Option<ProfileText>,
     /// Clusters per slice, in place of the profile's.
     #[schema(minimum = 1, maximum = 4096)]
     clusters: Option<u32>,
@@ -41,7 +43,7 @@ pub struct BlendOrder {
 #[derive(Debug, Serialize, Deserialize)]
 struct BlendRequest {
     paints: Vec<String>,
-    accuracy: Accuracy,
+    profile: Profile,
 }
 
 /// Blend paints.
@@ -74,8 +76,8 @@ pub async fn create(
             Problem::value("/paints", detail).accepting(format!("2 to {most} ids of paints"))
         );
     }
-    let refuse = |field: &str, detail: String| Problem::value(format!("/{field}"), detail);
-    let accuracy = accuracy("clusters", refuse, order.profile, order.clusters)?;
+    let asked = order.profile.unwrap_or_default();
+    let profile = asked.with_clusters(order.clusters).of_body()?;
     for (place, id) in order.paints.iter().enumerate() {
         if !ids::is("p_", id) || app.catalogue.paint(id).await?.is_none() {
             return Err(Problem::value(
@@ -85,7 +87,7 @@ pub async fn create(
             .accepting("ids that GET /v1/paints lists"));
         }
     }
-    let id = ids::made_of("b_", &(&order.paints, accuracy));
+    let id = ids::made_of("b_", &(&order.paints, profile));
     let address = format!("/v1/blends/{id}");
     if app.catalogue.blend(&id).await?.is_some() {
         let known = app.blend(&id).await?.document.clone();
@@ -94,7 +96,7 @@ pub async fn create(
     }
     let request = BlendRequest {
         paints: order.paints,
-        accuracy,
+        profile,
     };
     let job = runner::submit(&app, JobKind::Blend, &id, &request).await?;
     let made = || async { Ok(app.blend(&id).await?.document.clone()) };
@@ -107,7 +109,7 @@ pub(super) async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended,
     if app.catalogue.blend(id).await?.is_some() {
         return Ok(Ok(()));
     }
-    let BlendRequest { paints, accuracy } = under_way.request()?;
+    let BlendRequest { paints, profile } = under_way.request()?;
     under_way.stage("reading");
     let mut shelved = Vec::with_capacity(paints.len());
     for paint in &paints {
@@ -115,11 +117,11 @@ pub(super) async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended,
     }
     let (canonical, places) = in_order_of_hashes(&shelved);
     let names: Vec<&str> = canonical.iter().map(|paint| paint.id.as_str()).collect();
-    let key = ids::key("blend", &(&names, accuracy));
+    let key = ids::key("blend", &(&names, profile));
     // Whichever order is asked for first finds the correspondence, the others wait for it.
     let file = loop {
         let (on, this, paints) = (app.clone(), Arc::clone(under_way), canonical.clone());
-        let compute = move || async move { correspond(&on, &this, paints, accuracy).await };
+        let compute = move || async move { correspond(&on, &this, paints, profile).await };
         match app.results.get_or_compute(key, compute).await {
             Ok(found) => break found.bytes,
             Err(problem) if problem.kind() != Kind::JobCancelled => return Err(problem),
@@ -132,7 +134,7 @@ pub(super) async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended,
     let _writing = app.removal.read().await;
     let blend = app.blobs.put(file).await?.hash;
     let options =
-        serde_json::to_string(&BlendOptions { accuracy, places }).map_err(Problem::internal)?;
+        serde_json::to_string(&BlendOptions { profile, places }).map_err(Problem::internal)?;
     app.catalogue
         .add_blend(&BlendRecord {
             id: id.clone(),
@@ -148,7 +150,7 @@ async fn correspond(
     app: &App,
     under_way: &Arc<UnderWay>,
     paints: Vec<Arc<Shelved>>,
-    accuracy: Accuracy,
+    profile: Profile,
 ) -> Result<Bytes, Problem> {
     let works = Arc::clone(&app.works);
     let found = under_way.compute(app, "blending", move |progress| {
@@ -157,7 +159,7 @@ async fn correspond(
             .filter_map(|paint| paint.file_of_paint())
             .collect();
         works
-            .blend(&files, accuracy, progress)
+            .blend(&files, &profile, progress)
             .map(|blend| Bytes::from(blend.to_bytes()))
     });
     let Ok(found) = found.await? else {
@@ -225,7 +227,7 @@ pub(super) fn links(id: &str, paints: &[String], options: &BlendOptions) -> Valu
         vec![(1.0 / f64::from(u32::try_from(paints.len()).unwrap_or(1))).to_string(); paints.len()]
             .join(",");
     json!({
-        "request": { "paints": paints, "profile": options.accuracy.profile, "clusters": options.accuracy.clusters },
+        "request": { "paints": paints, "profile": options.profile.name(), "knobs": options.profile },
         "links": {
             "self": base,
             "paints": paints.iter().map(|paint| format!("/v1/paints/{paint}")).collect::<Vec<_>>(),

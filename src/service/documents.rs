@@ -32,6 +32,12 @@ pub struct PaintDocument {
     /// How far the fit is from its measurement, with the floor beside it; null where nothing was fitted.
     #[schema(value_type = Option<Object>)]
     pub residuals: Value,
+    /// How far the paint is from the multi-angle readings that came with its measurement; null where none did.
+    #[schema(value_type = Option<Object>)]
+    pub multi_angle: Value,
+    /// What had to be clamped, of a realised paint.
+    #[schema(value_type = Vec<Object>)]
+    pub clamps: Value,
     /// Energy certificate: directional albedo at six incidences.
     #[schema(value_type = Object)]
     pub energy: Value,

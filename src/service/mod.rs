@@ -24,6 +24,7 @@ mod operations;
 mod paints;
 mod previews;
 mod problem;
+mod profile;
 mod query;
 mod realisations;
 mod runner;
@@ -40,8 +41,8 @@ pub use docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
-    Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH,
-    Thing, View, WorkError, Works,
+    Fault, Format, IngestOrder, Layout, Picture, PictureFormat, Progress, Scene, ThetaH, Thing,
+    View, WorkError, Works,
 };
 pub use workshop::Workshop;
 

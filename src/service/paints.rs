@@ -18,10 +18,11 @@ use super::documents::{PaintDocument, PaintList, PaintSummary};
 use super::extract::{Address, NoQuery, Query};
 use super::ids;
 use super::problem::{Kind, Problem, ProblemDocument};
+use super::profile::ProfileText;
 use super::runner::{self, Ended, JobDocument, UnderWay};
 use super::waiting::Prefer;
 use super::workbench::CalledOff;
-use super::works::{Accuracy, Format, IngestOrder, Layout, Preset, ThetaH};
+use super::works::{Format, IngestOrder, Layout, ThetaH};
 use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
 
 /// Longest silence in the middle of an upload.
@@ -54,8 +55,9 @@ pub struct IngestQuery {
     /// Give the paint a clear coat of this index of refraction; otherwise the fit decides.
     #[param(minimum = 1.0, maximum = 4.0)]
     coat_ior: Option<f64>,
-    /// Accuracy.
-    profile: Option<Preset>,
+    /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,clusters=100`.
+    #[param(value_type = Option<String>, example = "standard")]
+    profile: Option<ProfileText>,
     /// Clusters per slice, in place of the profile's.
     #[param(minimum = 1, maximum = 4096)]
     clusters: Option<u32>,
@@ -118,32 +120,16 @@ impl IngestQuery {
                     .accepting("0 to 1048576"),
             );
         }
+        let asked = self.profile.unwrap_or_default();
         Ok(IngestOrder {
             name: self.name,
             layout: self.layout,
             theta_h: self.theta_h,
             header_bytes: self.header_bytes,
             coat_ior: self.coat_ior,
-            accuracy: accuracy("clusters", Problem::parameter, self.profile, self.clusters)?,
+            clusters: self.clusters.or(asked.0.clusters),
+            profile: asked.with_clusters(self.clusters).of_query()?,
         })
-    }
-}
-
-/// An accuracy, with its clusters in range.
-pub(super) fn accuracy(
-    field: &str,
-    refuse: impl FnOnce(&str, String) -> Problem,
-    profile: Option<Preset>,
-    clusters: Option<u32>,
-) -> Result<Accuracy, Problem> {
-    match clusters {
-        Some(clusters) if !(1..=4096).contains(&clusters) => {
-            Err(refuse(field, format!("clusters is {clusters}.")).accepting("1 to 4096"))
-        }
-        _ => Ok(Accuracy {
-            profile: profile.unwrap_or_default(),
-            clusters,
-        }),
     }
 }
 

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use axum::extract::State;
+use axum::http::HeaderName;
+use bytes::Bytes;
 use serde::{Deserialize, Deserializer};
 use utoipa::IntoParams;
 
@@ -13,10 +15,11 @@ use super::app::{App, Shelved};
 use super::extract::{Address, Query, QueryOfTwo};
 use super::ids;
 use super::problem::{Problem, ProblemDocument};
+use super::profile::ProfileText;
 use super::weights::WeightQuery;
-use super::works::{Accuracy, PictureFormat, Preset, Scene, View, WorkError};
-use super::workshop::profile;
+use super::works::{Picture, PictureFormat, Scene, View};
 use crate::blend::RealisationWeights;
+use crate::store::CachedResult;
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u32 = 4096;
@@ -36,8 +39,9 @@ pub struct ViewQuery {
     /// Samples per pixel, in place of the profile's.
     #[param(minimum = 1, maximum = 4096)]
     spp: Option<u32>,
-    /// Accuracy.
-    profile: Option<Preset>,
+    /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `draft,samples_per_pixel=100`.
+    #[param(value_type = Option<String>, example = "standard")]
+    profile: Option<ProfileText>,
 }
 
 /// `WxH` in pixels.
@@ -78,12 +82,10 @@ impl ViewQuery {
                     .accepting(format!("1 to {most}")));
             }
             None => {
-                let accuracy = Accuracy {
-                    profile: self.profile.unwrap_or_default(),
-                    clusters: None,
-                };
-                profile(accuracy)
-                    .map_err(|error| WorkError::from(error).of_query())?
+                self.profile
+                    .clone()
+                    .unwrap_or_default()
+                    .of_query()?
                     .samples_per_pixel
             }
         };
@@ -108,7 +110,7 @@ impl ViewQuery {
     get, operation_id = "preview_blend", path = "/v1/blends/{id}/preview.{format}", tag = "previews",
     params(("id" = String, Path, description = "Blend"), ("format" = PictureFormat, Path, description = "Picture"), WeightQuery, ViewQuery),
     responses(
-        (status = 200, description = "The picture", content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
+        (status = 200, description = "The picture", headers(("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
         (status = 400, description = "Weights that do not fit the blend, or a view that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
@@ -129,7 +131,7 @@ pub async fn of_blend(
     get, operation_id = "preview_paint", path = "/v1/paints/{id}/preview.{format}", tag = "previews",
     params(("id" = String, Path, description = "Paint"), ("format" = PictureFormat, Path, description = "Picture"), ViewQuery),
     responses(
-        (status = 200, description = "The picture", content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
+        (status = 200, description = "The picture", headers(("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
         (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
@@ -163,13 +165,33 @@ async fn draw(
             .bench
             .run(move || works.preview(&thing.thing, weights.as_ref(), &view, format))
             .await?;
-        let bytes = drawn.map_err(super::works::WorkError::of_query)?;
+        let picture = drawn.map_err(super::works::WorkError::of_query)?;
         counter.increment(1);
-        Ok(bytes.into())
+        Ok(with_accuracy(&picture))
     };
-    let result = app.results.get_or_compute(key, compute).await?;
-    Ok(
-        Answer::result(format.media_type(), result, Keep::ForEver)
-            .stage("preview", begun.elapsed()),
-    )
+    let kept = app.results.get_or_compute(key, compute).await?;
+    let (accuracy, picture) = split(&kept)?;
+    Ok(Answer::result(format.media_type(), picture, Keep::ForEver)
+        .header(ACCURACY, &accuracy)
+        .stage("preview", begun.elapsed()))
+}
+
+/// How accurate a picture is: it belongs to the picture, so it is kept with it.
+const ACCURACY: HeaderName = HeaderName::from_static("carpaint-accuracy");
+
+/// What is kept of a picture: its accuracy, a line feed, the file.
+fn with_accuracy(picture: &Picture) -> Bytes {
+    [picture.accuracy.as_bytes(), b"\n", &picture.bytes]
+        .concat()
+        .into()
+}
+
+fn split(kept: &CachedResult) -> Result<(String, CachedResult), Problem> {
+    let end = kept.bytes.iter().position(|&byte| byte == b'\n');
+    let end = end.ok_or_else(|| Problem::internal("a kept picture without its accuracy"))?;
+    let accuracy = String::from_utf8_lossy(&kept.bytes[..end]).into_owned();
+    let bytes = kept.bytes.slice(end + 1..);
+    // The hash of both tells pictures apart as surely as that of one.
+    let hash = kept.hash;
+    Ok((accuracy, CachedResult { hash, bytes }))
 }

@@ -12,16 +12,18 @@ use super::app::{App, Shelved};
 use super::extract::{Address, Query, QueryOfTwo};
 use super::ids;
 use super::problem::{Problem, ProblemDocument};
+use super::profile::ProfileText;
 use super::weights::WeightQuery;
-use super::works::{Accuracy, Format, Preset};
+use super::works::Format;
 use crate::blend::RealisationWeights;
 
 /// How accurately a file is written.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub struct ProfileQuery {
-    /// Accuracy.
-    pub(super) profile: Option<Preset>,
+    /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,precision=f32,draw=alias`.
+    #[param(value_type = Option<String>, example = "standard")]
+    pub(super) profile: Option<ProfileText>,
 }
 
 /// A blend at some weights, as a file.
@@ -79,10 +81,7 @@ async fn realise(
     query: ProfileQuery,
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
-    let accuracy = Accuracy {
-        profile: query.profile.unwrap_or_default(),
-        clusters: None,
-    };
+    let profile = query.profile.unwrap_or_default().of_query()?;
     let key = ids::key(
         "realisation",
         &(
@@ -90,7 +89,7 @@ async fn realise(
             thing.file.to_string(),
             &weights,
             format,
-            accuracy,
+            profile.export,
         ),
     );
     let name = format!("{}.{}", thing.id, format.ending());
@@ -102,7 +101,7 @@ async fn realise(
         );
         let made = on
             .bench
-            .run(move || works.realise(&thing.thing, weights.as_ref(), format, accuracy))
+            .run(move || works.realise(&thing.thing, weights.as_ref(), format, &profile))
             .await?;
         let bytes = made.map_err(super::works::WorkError::of_query)?;
         counter.increment(1);

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
+use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::paint::PaintFile;
 
@@ -14,28 +15,6 @@ use crate::paint::PaintFile;
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
 pub use crate::workshop::Thing;
-
-/// Named accuracy presets.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Preset {
-    /// Fast: few clusters, greedy correspondence, few samples.
-    Draft,
-    /// 50 clusters a slice, exact transport.
-    #[default]
-    Standard,
-    /// What the others are measured against.
-    Reference,
-}
-
-/// How accurate, which is how slow.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Accuracy {
-    /// Preset.
-    pub profile: Preset,
-    /// Clusters per slice, in place of the preset's.
-    pub clusters: Option<u32>,
-}
 
 /// What a measurement file is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -75,8 +54,10 @@ pub struct IngestOrder {
     pub header_bytes: Option<u64>,
     /// Index of refraction of the coat, where the caller knows it.
     pub coat_ior: Option<f64>,
-    /// Accuracy.
-    pub accuracy: Accuracy,
+    /// How accurate.
+    pub profile: Profile,
+    /// Clusters that were asked for by number.
+    pub clusters: Option<u32>,
 }
 
 /// What a realisation is written as.
@@ -127,6 +108,15 @@ pub struct View {
     pub samples_per_pixel: u32,
 }
 
+/// A picture with the account of its accuracy.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// How accurate it is, as the value of a header: the same for the same picture.
+    pub accuracy: String,
+}
+
 /// Whose fault it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
@@ -172,7 +162,7 @@ pub trait Works: Debug + Send + Sync {
     fn blend(
         &self,
         paints: &[&PaintFile],
-        accuracy: Accuracy,
+        profile: &Profile,
         progress: Progress<'_>,
     ) -> Result<Blend, WorkError>;
 
@@ -186,7 +176,7 @@ pub trait Works: Debug + Send + Sync {
         thing: &Thing,
         weights: Option<&RealisationWeights>,
         format: Format,
-        accuracy: Accuracy,
+        profile: &Profile,
     ) -> Result<Vec<u8>, WorkError>;
 
     /// All paints of a blend become one texture bundle.
@@ -194,7 +184,7 @@ pub trait Works: Debug + Send + Sync {
     /// # Errors
     ///
     /// [`WorkError`] for a thing that is no blend.
-    fn bundle(&self, blend: &Thing, accuracy: Accuracy) -> Result<Vec<u8>, WorkError>;
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError>;
 
     /// A paint, or a blend at some weights, becomes a picture.
     ///
@@ -207,7 +197,7 @@ pub trait Works: Debug + Send + Sync {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
-    ) -> Result<Vec<u8>, WorkError>;
+    ) -> Result<Picture, WorkError>;
 
     /// What is known about a paint or a blend.
     fn describe(&self, thing: &Thing) -> Value;

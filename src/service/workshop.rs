@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Accuracy, Fault, Format, IngestOrder, Layout, PictureFormat, Preset, Progress, Scene, ThetaH,
-    Thing, View, WorkError, Works,
+    Fault, Format, IngestOrder, Layout, Picture, PictureFormat, Progress, Scene, ThetaH, Thing,
+    View, WorkError, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
@@ -43,21 +43,6 @@ impl From<WorkshopError> for WorkError {
     }
 }
 
-/// The settings of an accuracy.
-pub(super) fn profile(accuracy: Accuracy) -> Result<Profile, WorkshopError> {
-    let preset = match accuracy.profile {
-        Preset::Draft => Profile::draft(),
-        Preset::Standard => Profile::standard(),
-        Preset::Reference => Profile::reference(),
-    };
-    match accuracy.clusters {
-        None => Ok(preset),
-        Some(clusters) => preset
-            .with_clusters(clusters as usize)
-            .map_err(|error| WorkshopError::usage("clusters", error)),
-    }
-}
-
 impl Works for Workshop {
     fn ingest(
         &self,
@@ -83,8 +68,8 @@ impl Works for Workshop {
                 header_bytes: order.header_bytes,
             },
             coat_ior: order.coat_ior,
-            clusters: order.accuracy.clusters.map(|n| n as usize),
-            profile: profile(order.accuracy)?,
+            clusters: order.clusters.map(|n| n as usize),
+            profile: order.profile,
             limits: self.limits,
         };
         Ok(workshop::ingest_upload(upload, &options, progress)?)
@@ -93,10 +78,10 @@ impl Works for Workshop {
     fn blend(
         &self,
         paints: &[&PaintFile],
-        accuracy: Accuracy,
+        profile: &Profile,
         progress: Progress<'_>,
     ) -> Result<Blend, WorkError> {
-        Ok(workshop::blend_paints(paints, &profile(accuracy)?, progress)?.blend)
+        Ok(workshop::blend_paints(paints, profile, progress)?.blend)
     }
 
     fn realise(
@@ -104,7 +89,7 @@ impl Works for Workshop {
         thing: &Thing,
         weights: Option<&RealisationWeights>,
         format: Format,
-        accuracy: Accuracy,
+        profile: &Profile,
     ) -> Result<Vec<u8>, WorkError> {
         let format = match format {
             Format::Zip => workshop::Format::Zip,
@@ -112,11 +97,11 @@ impl Works for Workshop {
             Format::Json => workshop::Format::Json,
             Format::Paint => workshop::Format::Paint,
         };
-        Ok(workshop::realise(thing, weights, format, &profile(accuracy)?)?.bytes)
+        Ok(workshop::realise(thing, weights, format, profile)?.bytes)
     }
 
-    fn bundle(&self, blend: &Thing, accuracy: Accuracy) -> Result<Vec<u8>, WorkError> {
-        Ok(workshop::bundle_blend(blend, &profile(accuracy)?)?.bytes)
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError> {
+        Ok(workshop::bundle_blend(blend, profile)?.bytes)
     }
 
     fn preview(
@@ -125,7 +110,7 @@ impl Works for Workshop {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
-    ) -> Result<Vec<u8>, WorkError> {
+    ) -> Result<Picture, WorkError> {
         let scene = match view.scene {
             Scene::Sphere => "sphere",
             Scene::Capsule => "capsule",
@@ -141,7 +126,20 @@ impl Works for Workshop {
             PictureFormat::Png => workshop::PictureFormat::Png,
             PictureFormat::Exr => workshop::PictureFormat::Exr,
         };
-        Ok(workshop::preview(thing, weights, &options, format, &self.limits, &|_| ())?.bytes)
+        let made = workshop::preview(thing, weights, &options, format, &self.limits, &|_| ())?;
+        let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
+        let mut accuracy = Vec::new();
+        for (name, path) in [
+            ("sampling-mean-de2000", "/rendering/sampling/mean_delta_e"),
+            ("sampling-p95-de2000", "/rendering/sampling/p95_delta_e"),
+            ("flakes-lab", "/error/lab"),
+        ] {
+            accuracy.extend(number(path).map(|value| format!("{name}={value:.4}")));
+        }
+        Ok(Picture {
+            bytes: made.bytes,
+            accuracy: accuracy.join(", "),
+        })
     }
 
     fn describe(&self, thing: &Thing) -> Value {

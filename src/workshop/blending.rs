@@ -1,10 +1,11 @@
 //! Blending paints: those with too many clusters are reduced first.
 
 use super::WorkshopError;
-use crate::accuracy::Profile;
-use crate::blend::{Blend, BlendError, Ingredient};
-use crate::fit::reduce_clusters;
-use crate::paint::{CarPaint, PaintFile};
+use crate::accuracy::{Profile, blend_deviation};
+use crate::blend::{Blend, BlendError, Ingredient, Origin, Reduction};
+use crate::fit::{ClusterSettings, reduce_clusters};
+use crate::paint::{CarPaint, Flakes, PaintFile};
+use crate::transport::TransportError;
 
 /// A new blend and what was done on the way.
 #[derive(Clone, Debug)]
@@ -28,7 +29,7 @@ pub fn blend_paints(
     let mut notes = Vec::new();
     let reduced: Vec<Option<CarPaint>> = paints
         .iter()
-        .map(|file| reduced(file, profile.flakes.clusters, &mut notes))
+        .map(|file| reduced(file, &profile.flakes, &mut notes))
         .collect();
     let ingredients: Vec<Ingredient<'_>> = paints
         .iter()
@@ -43,39 +44,85 @@ pub fn blend_paints(
             BlendError::Paints(_) | BlendError::Angles { .. } => {
                 WorkshopError::usage("paints", error)
             }
+            BlendError::Transport {
+                source: TransportError::TooManyPoints { .. },
+                ..
+            } => WorkshopError::usage(
+                "clusters",
+                format!("{error}: blend paints with fewer clusters, or fewer paints"),
+            ),
             _ => WorkshopError::internal(error),
         })?;
-    let by_hash: Vec<&str> = blend.paints.iter().map(|p| p.name.as_str()).collect();
+    let origins = paints.iter().zip(&reduced).map(|(file, reduced)| Origin {
+        simulated_flakes: file.provenance.simulated_flakes,
+        reduced: reduced.as_ref().map(|fewer| Reduction {
+            from: widest(&file.paint),
+            to: widest(fewer),
+        }),
+    });
+    let deviation =
+        blend_deviation(&ingredients, &profile.blend).map_err(WorkshopError::internal)?;
+    let clusterings: Vec<_> = paints.iter().map(|file| file.clustering.clone()).collect();
+    let blend = blend
+        .with_origins(origins)
+        .with_accuracy(deviation, &clusterings);
     let report = blend.report();
+    let named = |place: usize| {
+        let asked = blend.asked_at(place).and_then(|k| paints.get(k));
+        asked.map_or("", |file| file.name.as_str())
+    };
     for &place in &report.mixed {
         notes.push(format!(
             "{}: its angles differ from the common grid of {} slices; slices in between are mixtures of their neighbours",
-            by_hash[place], report.slices
+            named(place), report.slices
         ));
     }
     for &place in &report.without_flakes {
         notes.push(format!(
             "{}: has no flakes and counts as black ones",
-            by_hash[place]
+            named(place)
         ));
     }
     Ok(Blended { blend, notes })
 }
 
-/// The paint with at most `most` clusters a slice, if it came from a blend and has more.
-fn reduced(file: &PaintFile, most: usize, notes: &mut Vec<String>) -> Option<CarPaint> {
-    let flakes = file
-        .paint
-        .flakes
-        .as_ref()
-        .filter(|f| file.provenance.source == "blend" && f.widest_slice() > most)?;
-    notes.push(format!(
-        "{}: up to {} clusters a slice were reduced to {most}",
-        file.name,
-        flakes.widest_slice()
-    ));
-    Some(CarPaint {
-        flakes: Some(reduce_clusters(flakes, most)),
+fn widest(paint: &CarPaint) -> usize {
+    paint.flakes.as_ref().map_or(0, Flakes::widest_slice)
+}
+
+/// The paint as the profile wants it: with fewer angles if it was fitted at more, and, if it came from a blend and has
+/// more clusters, with fewer of those.
+fn reduced(
+    file: &PaintFile,
+    wanted: &ClusterSettings,
+    notes: &mut Vec<String>,
+) -> Option<CarPaint> {
+    let flakes = file.paint.flakes.as_ref()?;
+    let had = file.clustering.as_ref().map_or(1, |c| c.angle_step);
+    let thinned = (wanted.angle_step / had.max(1) > 1).then(|| {
+        let thinned = flakes.thinned(wanted.angle_step / had);
+        notes.push(format!(
+            "{}: {} of {} flake slices were used, every {}th angle",
+            file.name,
+            thinned.slices(),
+            flakes.slices(),
+            wanted.angle_step
+        ));
+        thinned
+    });
+    let flakes = thinned.as_ref().unwrap_or(flakes);
+    let fewer = (file.provenance.source == "blend" && flakes.widest_slice() > wanted.clusters)
+        .then(|| {
+            notes.push(format!(
+                "{}: up to {} clusters a slice were reduced to {}",
+                file.name,
+                flakes.widest_slice(),
+                wanted.clusters
+            ));
+            reduce_clusters(flakes, wanted.clusters)
+        });
+    fewer.or(thinned).map(|flakes| CarPaint {
+        flakes: Some(flakes),
         ..file.paint.clone()
     })
 }

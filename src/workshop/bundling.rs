@@ -2,8 +2,9 @@
 
 use serde_json::json;
 
+use super::describing::describe_correspondence;
 use super::{Made, Thing, WorkshopError};
-use crate::accuracy::Profile;
+use crate::accuracy::{Profile, blend_error};
 use crate::blend::Blend;
 use crate::export::{self, About};
 use crate::paint::Provenance;
@@ -31,13 +32,16 @@ fn of_blend(blend: &Blend, profile: &Profile) -> Result<Made, WorkshopError> {
     let report = json!({
         "paints": names,
         "hashes": hashes,
-        "correspondence": blend.report(),
+        "correspondence": describe_correspondence(blend),
+        // At weights between 0 and 1 that sum to 1, before corners are rounded, which `flakes` tells of.
+        "accuracy": { "error": blend_error(blend) },
     });
     let about = About {
         name: names.join(" + "),
         provenance: Provenance {
             source: "blend".to_owned(),
             hashes: hashes.iter().map(|&h| h.to_owned()).collect(),
+            simulated_flakes: blend.origins().any(|origin| origin.simulated_flakes),
             ..Provenance::default()
         },
         report: report.clone(),

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use crate::accuracy::{blend_error, paint_error, sparkle};
 use crate::blend::Blend;
 use crate::paint::{ASPECULAR_DEG, Chi, PaintFile, Reflectance, instrument_pairs};
 
@@ -43,12 +44,47 @@ pub fn describe_paint(file: &PaintFile) -> Value {
             "lifetime_deg": flakes.texture.lifetime_deg,
             "persistence_deg": flakes.texture.persistence_deg,
             "clustering": file.clustering,
+            "sparkle": sparkle(paint),
         })),
+        "error": paint_error(file),
         "readings": { "illuminant": "D65", "observer": "2", "illumination_deg": 45, "rows": readings },
         "residuals": file.residuals,
+        "multi_angle": file.readings,
+        "clamps": file.provenance.realisation.as_ref().map_or(&[][..], |of| &of.clamps),
         "energy": file.energy,
         "warnings": file.warnings,
     })
+}
+
+/// How the paints of a blend correspond. Paints are named, with their place in the order asked for.
+pub(super) fn describe_correspondence(blend: &Blend) -> Value {
+    let names: Vec<&str> = blend.ingredients().map(|(name, _)| name).collect();
+    let report = blend.report();
+    let told = |places: &[usize]| -> Vec<Value> {
+        let mut asked: Vec<usize> = places.iter().filter_map(|&p| blend.asked_at(p)).collect();
+        asked.sort_unstable();
+        asked
+            .into_iter()
+            .map(|k| json!({ "place": k, "name": names[k] }))
+            .collect()
+    };
+    let reduced: Vec<Value> = blend
+        .origins()
+        .enumerate()
+        .filter_map(|(k, origin)| origin.reduced.map(|by| (k, by)))
+        .map(|(k, by)| json!({ "place": k, "name": names[k], "from": by.from, "to": by.to }))
+        .collect();
+    let mut correspondence = json!(report);
+    correspondence["mixed"] = told(&report.mixed).into();
+    correspondence["without_flakes"] = told(&report.without_flakes).into();
+    correspondence["reduced"] = reduced.into();
+    if let Value::Object(fields) = &mut correspondence {
+        // Weights follow the order asked for; the paints are joined in this one.
+        fields
+            .entry("order")
+            .or_insert_with(|| json!("content hash"));
+    }
+    correspondence
 }
 
 /// Ingredients, settings and correspondence of a blend.
@@ -56,13 +92,15 @@ pub fn describe_paint(file: &PaintFile) -> Value {
 pub fn describe_blend(blend: &Blend) -> Value {
     let paints: Vec<Value> = blend
         .ingredients()
-        .map(|(name, hash)| json!({ "name": name, "hash": hash }))
+        .zip(blend.origins())
+        .map(|((name, hash), origin)| json!({ "name": name, "hash": hash, "simulated_flakes": origin.simulated_flakes }))
         .collect();
     json!({
         "paints": paints,
         "weights": format!("{} numbers, in this order", blend.len()),
         "settings": blend.settings(),
-        "correspondence": blend.report(),
+        "correspondence": describe_correspondence(blend),
+        "error": blend_error(blend),
         "flakes": blend.flakes.as_ref().map(|f| json!({
             "theta_h_deg": f.theta_h.degrees(),
             "theta_d_deg": f.theta_d.degrees(),

@@ -5,8 +5,10 @@
 
 mod blending;
 mod bundling;
+mod content;
 mod describing;
 mod error;
+mod estimate;
 mod evaluating;
 mod ingest;
 mod previewing;
@@ -18,8 +20,15 @@ pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};
 pub use error::{Fault, WorkshopError};
+pub use estimate::{
+    Estimate, EstimatedError, Stage, estimate_blend, estimate_blend_of, estimate_ingest,
+    estimate_preview, estimate_realise,
+};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
-pub use ingest::{IngestOptions, Measurement, ingest, ingest_upload, open_measurement};
+pub use ingest::{
+    BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, ingest, ingest_upload,
+    open_measurement,
+};
 pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};

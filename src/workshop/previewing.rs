@@ -4,11 +4,11 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::realising::{Made, choose};
+use super::realising::{Made, choose, error_of};
 use super::{Thing, WorkshopError, read};
 use crate::blend::RealisationWeights;
 use crate::paint::{CarPaint, Limits};
-use crate::render::{self, Environment, RenderError, Scene, Shape};
+use crate::render::{self, Environment, RenderError, SamplingError, Scene, Shape};
 
 /// What a picture shows.
 #[derive(Clone, Debug)]
@@ -73,6 +73,39 @@ pub fn preview(
     limits: &Limits,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Made, WorkshopError> {
+    let scene = scene_of(options, limits)?;
+    let chosen = choose(thing, weights)?;
+    let rendering = render::render(&chosen.paint, &scene, progress).map_err(refused)?;
+    let bytes = match format {
+        PictureFormat::Png => rendering.film.to_png(),
+        PictureFormat::Exr => rendering.film.to_exr(),
+    }
+    .map_err(WorkshopError::internal)?;
+    let report = json!({
+        "realisation": chosen.report,
+        "rendering": rendering.report,
+        "error": error_of(thing, weights),
+    });
+    Ok(Made {
+        bytes,
+        report,
+        notes: chosen.notes,
+    })
+}
+
+/// What the samples of a picture will leave to chance.
+pub(super) fn sampling(
+    thing: &Thing,
+    weights: Option<&RealisationWeights>,
+    options: &PreviewOptions,
+    limits: &Limits,
+) -> Result<SamplingError, WorkshopError> {
+    let scene = scene_of(options, limits)?;
+    let chosen = choose(thing, weights)?;
+    render::sampling(&chosen.paint, &scene).map_err(refused)
+}
+
+fn scene_of(options: &PreviewOptions, limits: &Limits) -> Result<Scene, WorkshopError> {
     let shape: Shape = serde_json::from_value(json!(options.scene)).map_err(|_| {
         WorkshopError::usage(
             "scene",
@@ -88,19 +121,7 @@ pub fn preview(
         scene = scene.in_environment(environment.clone());
     }
     scene.validate(limits).map_err(refused)?;
-    let chosen = choose(thing, weights)?;
-    let rendering = render::render(&chosen.paint, &scene, progress).map_err(refused)?;
-    let bytes = match format {
-        PictureFormat::Png => rendering.film.to_png(),
-        PictureFormat::Exr => rendering.film.to_exr(),
-    }
-    .map_err(WorkshopError::internal)?;
-    let report = json!({ "realisation": chosen.report, "rendering": rendering.report });
-    Ok(Made {
-        bytes,
-        report,
-        notes: chosen.notes,
-    })
+    Ok(scene)
 }
 
 fn refused(error: RenderError) -> WorkshopError {

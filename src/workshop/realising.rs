@@ -4,11 +4,14 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use super::describing::describe_correspondence;
 use super::{Thing, WorkshopError};
-use crate::accuracy::Profile;
-use crate::blend::{Blend, Clamp, RealisationWeights};
-use crate::export::{self, About};
-use crate::paint::{CarPaint, Clustering, PaintFile, Provenance, certify};
+use crate::accuracy::{
+    Profile, ResultError, blend_error, file_error, paint_error, sparkle, writing_error,
+};
+use crate::blend::{Blend, RealisationWeights};
+use crate::export::{self, About, ExportSettings};
+use crate::paint::{CarPaint, Clamp, Clustering, PaintFile, Provenance, Realisation, certify};
 
 /// What a realisation is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -92,16 +95,7 @@ pub(super) fn choose(
 fn of_blend(blend: &Blend, weights: &RealisationWeights) -> Result<Chosen, WorkshopError> {
     let realised = blend.realise(weights)?;
     let (names, hashes): (Vec<&str>, Vec<&str>) = blend.ingredients().unzip();
-    let mut notes: Vec<String> = realised
-        .clamps
-        .iter()
-        .map(|c| {
-            format!(
-                "{}: {}, {} of {}, the worst by {:.4}",
-                c.field, c.bound, c.count, c.of, c.worst
-            )
-        })
-        .collect();
+    let mut notes: Vec<String> = realised.clamps.iter().map(Clamp::to_string).collect();
     for (what, sum) in ["base", "flake lightness", "flake color"]
         .iter()
         .zip(realised.weight_sums)
@@ -116,11 +110,20 @@ fn of_blend(blend: &Blend, weights: &RealisationWeights) -> Result<Chosen, Works
         "weights": weights,
         "weight_sums": realised.weight_sums,
         "clamps": realised.clamps,
-        "correspondence": blend.report(),
+        "correspondence": describe_correspondence(blend),
     });
     let provenance = Provenance {
         source: "blend".to_owned(),
         hashes: hashes.iter().map(|&h| h.to_owned()).collect(),
+        simulated_flakes: blend.origins().any(|origin| origin.simulated_flakes),
+        realisation: Some(Realisation {
+            paints: names.iter().map(|&name| name.to_owned()).collect(),
+            base: weights.base().to_vec(),
+            flake_lightness: weights.flake_lightness().to_vec(),
+            flake_color: weights.flake_color().to_vec(),
+            flake_saturation: weights.flake_saturation,
+            clamps: realised.clamps.clone(),
+        }),
         ..Provenance::default()
     };
     Ok(Chosen {
@@ -151,7 +154,11 @@ pub fn realise(
             notes: Vec::new(),
         });
     }
-    let chosen = choose(thing, weights)?;
+    let mut chosen = choose(thing, weights)?;
+    if format != Format::Paint {
+        let error = error_of(thing, weights);
+        chosen.report["accuracy"] = accuracy(&error, &chosen.paint, &profile.export);
+    }
     let about = About {
         name: chosen.name.clone(),
         provenance: chosen.provenance.clone(),
@@ -177,12 +184,37 @@ pub fn realise(
     })
 }
 
+/// How far the file is from what the reference profile would have given, and its sparkle.
+fn accuracy(of: &ResultError, paint: &CarPaint, settings: &ExportSettings) -> Value {
+    let writing = writing_error(paint, settings);
+    json!({
+        "error": file_error(of, writing.as_ref()),
+        "writing": writing,
+        "sparkle": sparkle(paint),
+    })
+}
+
+/// Error of a thing at some weights, before anything is written of it.
+pub(super) fn error_of(thing: &Thing, weights: Option<&RealisationWeights>) -> ResultError {
+    match (thing, weights) {
+        (Thing::Paint(file), _) => paint_error(file),
+        (Thing::Blend(blend), None) => blend_error(blend),
+        (Thing::Blend(blend), Some(weights)) => {
+            let size = |weights: &[f64]| weights.iter().map(|w| w.abs()).sum::<f64>();
+            let color = size(weights.flake_color()) * weights.flake_saturation.abs();
+            blend_error(blend).stretched(size(weights.flake_lightness()).max(color))
+        }
+    }
+}
+
 /// A realised paint as a paint of its own.
 fn paint_file(chosen: &Chosen) -> PaintFile {
     let clustering = chosen.paint.flakes.as_ref().map(|f| Clustering {
         clusters: f.widest_slice(),
         box_rule: "blended".to_owned(),
-        w1: None,
+        angle_step: 1,
+        w1_bound: None,
+        error: None,
     });
     PaintFile {
         name: chosen.name.chars().take(200).collect(),
@@ -191,15 +223,7 @@ fn paint_file(chosen: &Chosen) -> PaintFile {
         paint: chosen.paint.clone(),
         clustering,
         residuals: None,
-        warnings: chosen
-            .clamps
-            .iter()
-            .map(|c| {
-                format!(
-                    "{}: {}, {} of {}, the worst by {:.4}",
-                    c.field, c.bound, c.count, c.of, c.worst
-                )
-            })
-            .collect(),
+        readings: None,
+        warnings: chosen.clamps.iter().map(Clamp::to_string).collect(),
     }
 }

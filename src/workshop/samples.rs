@@ -13,9 +13,10 @@ use std::ops::ControlFlow;
 
 use super::WorkshopError;
 use super::ingest::finish;
-use crate::accuracy::Profile;
-use crate::fit::{FlakeRecipe, simulate_flakes};
-use crate::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance};
+use crate::accuracy::{Profile, clustering_error};
+use crate::color::luminance;
+use crate::fit::{FlakeRecipe, SimulatedPatch, fit_flakes};
+use crate::paint::{CarPaint, Clustering, ColorTable, Lobe, PaintFile, Provenance};
 
 /// One sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +38,7 @@ struct Sparkle {
     per_mm2: f64,
     radius_um: f64,
     tilt: f64,
+    tint_spread: f64,
     seed: u64,
 }
 
@@ -57,6 +59,7 @@ pub const SAMPLES: [Sample; 8] = [
             per_mm2: 500.0,
             radius_um: 14.0,
             tilt: 0.15,
+            tint_spread: 0.08,
             seed: 0xf8,
         }),
     },
@@ -75,6 +78,7 @@ pub const SAMPLES: [Sample; 8] = [
             per_mm2: 2400.0,
             radius_um: 11.0,
             tilt: 0.17,
+            tint_spread: 0.03,
             seed: 0x51,
         }),
     },
@@ -93,6 +97,7 @@ pub const SAMPLES: [Sample; 8] = [
             per_mm2: 1400.0,
             radius_um: 13.0,
             tilt: 0.17,
+            tint_spread: 0.04,
             seed: 0x71,
         }),
     },
@@ -111,6 +116,7 @@ pub const SAMPLES: [Sample; 8] = [
             per_mm2: 1900.0,
             radius_um: 12.0,
             tilt: 0.17,
+            tint_spread: 0.05,
             seed: 0x339,
         }),
     },
@@ -177,6 +183,21 @@ impl Sample {
         self.flakes.is_some()
     }
 
+    /// The patch of flakes that is simulated for it; `None` for a solid color.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkshopError`] never: the recipes are in range.
+    pub fn patch(&self) -> Result<Option<SimulatedPatch>, WorkshopError> {
+        self.flakes
+            .map(|sparkle| {
+                let base = self.base();
+                SimulatedPatch::new(&base, &sparkle.recipe(&base))
+            })
+            .transpose()
+            .map_err(WorkshopError::internal)
+    }
+
     /// The base as the paper fitted it, without flakes.
     #[must_use]
     pub fn base(&self) -> CarPaint {
@@ -218,16 +239,19 @@ impl Sample {
             "Günther et al., VMV 2005, table of fits".to_owned(),
         );
         let (mut clustering, mut warnings) = (None, Vec::new());
-        if let Some(sparkle) = self.flakes {
+        if let Some(patch) = self.patch()? {
             let tell = |done: usize, of: usize| {
                 #[allow(clippy::cast_precision_loss)] // a progress bar
                 progress(done as f32 / of as f32);
                 ControlFlow::Continue(())
             };
-            let fitted = simulate_flakes(&paint, &sparkle.recipe(), &profile.flakes, &tell)
-                .map_err(|e| WorkshopError::usage("clusters", e))?;
+            let refused = |e| WorkshopError::usage("clusters", e);
+            let fitted = fit_flakes(&patch, &profile.flakes, &tell).map_err(refused)?;
             paint.flakes = Some(fitted.flakes);
-            clustering = Some(fitted.clustering);
+            clustering = Some(Clustering {
+                error: clustering_error(&patch, &paint),
+                ..fitted.clustering
+            });
             warnings = fitted.warnings;
             warnings.push("the flakes are simulated, not measured".to_owned());
             provenance.simulated_flakes = true;
@@ -243,12 +267,23 @@ impl Sample {
     }
 }
 
+/// Roughness from which a lobe is the metal's and not the lacquer's.
+const METAL_ALPHA: f64 = 0.05;
+
 impl Sparkle {
-    fn recipe(&self) -> FlakeRecipe {
+    /// Flakes whose metal has the color of the base's wide lobes, which is theirs seen from afar.
+    fn recipe(&self, base: &CarPaint) -> FlakeRecipe {
+        let wide = base.lobes.iter().filter(|lobe| lobe.alpha >= METAL_ALPHA);
+        let color = wide.fold([0.0; 3], |sum, lobe| {
+            std::array::from_fn(|c| sum[c] + lobe.weight[c])
+        });
+        let bright = luminance(color);
         FlakeRecipe {
             per_mm2: self.per_mm2,
             radius_um: self.radius_um,
             tilt: self.tilt,
+            tint: color.map(|c| c / bright),
+            tint_spread: self.tint_spread,
             seed: self.seed,
             ..FlakeRecipe::default()
         }

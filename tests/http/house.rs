@@ -5,10 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use carpaint::accuracy::Profile;
 use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
-    Accuracy, App, Fault, Format, IngestOrder, PictureFormat, Progress, ServiceConfig, Thing, View,
+    App, Fault, Format, IngestOrder, Picture, PictureFormat, Progress, ServiceConfig, Thing, View,
     WorkError, Works, open, serve,
 };
 use serde_json::{Value, json};
@@ -77,6 +78,7 @@ impl Works for Pretend {
             paint,
             clustering: None,
             residuals: None,
+            readings: None,
             warnings: Vec::new(),
         })
     }
@@ -84,7 +86,7 @@ impl Works for Pretend {
     fn blend(
         &self,
         paints: &[&PaintFile],
-        _: Accuracy,
+        _: &Profile,
         progress: Progress<'_>,
     ) -> Result<Blend, WorkError> {
         std::thread::sleep(Duration::from_millis(100));
@@ -104,7 +106,7 @@ impl Works for Pretend {
         thing: &Thing,
         weights: Option<&RealisationWeights>,
         format: Format,
-        _: Accuracy,
+        _: &Profile,
     ) -> Result<Vec<u8>, WorkError> {
         std::thread::sleep(Duration::from_millis(50));
         let diffuse = match thing {
@@ -122,8 +124,8 @@ impl Works for Pretend {
         Ok(format!("{format:?} {diffuse:?}").into_bytes())
     }
 
-    fn bundle(&self, blend: &Thing, accuracy: Accuracy) -> Result<Vec<u8>, WorkError> {
-        carpaint::service::Workshop::new(carpaint::paint::Limits::default()).bundle(blend, accuracy)
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError> {
+        carpaint::service::Workshop::new(carpaint::paint::Limits::default()).bundle(blend, profile)
     }
 
     fn preview(
@@ -132,9 +134,12 @@ impl Works for Pretend {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
-    ) -> Result<Vec<u8>, WorkError> {
-        let paint = self.realise(thing, weights, Format::Json, Accuracy::default())?;
-        Ok([format!("{format:?} {view:?} ").into_bytes(), paint].concat())
+    ) -> Result<Picture, WorkError> {
+        let paint = self.realise(thing, weights, Format::Json, &Profile::default())?;
+        Ok(Picture {
+            bytes: [format!("{format:?} {view:?} ").into_bytes(), paint].concat(),
+            accuracy: "sampling-mean-de2000=0.5".to_owned(),
+        })
     }
 
     fn describe(&self, thing: &Thing) -> Value {

@@ -12,8 +12,8 @@ use super::answer::{Answer, Keep};
 use super::extract::Address;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::{
-    blend_bundles, blends, documents, jobs, operations, paints, previews, realisations, runner,
-    works,
+    blend_bundles, blends, documents, jobs, operations, paints, previews, profile, realisations,
+    runner, works,
 };
 
 /// Only what this service itself serves.
@@ -38,8 +38,8 @@ const POLICY: &str =
     ),
     components(schemas(
         documents::PaintDocument, documents::PaintList, documents::PaintSummary, documents::BlendDocument,
-        blends::BlendOrder, runner::JobDocument, operations::Health, ProblemDocument,
-        works::Preset, works::Layout, works::ThetaH, works::Format, works::PictureFormat, works::Scene,
+        blends::BlendOrder, profile::ProfileDocument, profile::KnobsDocument, runner::JobDocument, operations::Health, ProblemDocument,
+        works::Layout, works::ThetaH, works::Format, works::PictureFormat, works::Scene,
     )),
     tags(
         (name = "paints", description = "Uploads become paints"),

@@ -1,0 +1,130 @@
+//! The error of a result in one number, with the terms that it is made of.
+//!
+//! Flakes are distributions of color, and the distance between two of them is W1 in Lab: how far the average texel's
+//! color has moved. What the stages misplace adds up by the triangle inequality: pixels to clusters at ingest, box to
+//! written box in a file. To it comes, of a blend, how much further flakes travel between the paints than they would
+//! have to: cost of the plan less its dual bound.
+//!
+//! ```text
+//! error = W1(pixels, clusters) + (cost − dual bound) + W1(box, rounded box)
+//! ```
+//!
+//! The reference profile's transport and files have none of the last two. A realisation outside the paints multiplies
+//! the first two by the sum of the weights' sizes.
+
+use serde::Serialize;
+
+use super::WritingError;
+use crate::blend::Blend;
+use crate::paint::{Clustering, PaintFile};
+
+/// Error of a result against the reference: in Lab, the distance by which its flakes' colors are misplaced.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ResultError {
+    /// Sum of the terms that are known, Lab units.
+    pub lab: f64,
+    /// What it is made of.
+    pub terms: Vec<Term>,
+}
+
+/// One term of an error.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Term {
+    /// What it is about: `clusters`, `transport`, `rounding`.
+    pub what: &'static str,
+    /// Lab units; null where it is not known.
+    pub lab: Option<f64>,
+    /// How it is known.
+    pub how: &'static str,
+}
+
+impl ResultError {
+    fn of(terms: Vec<Term>) -> Self {
+        Self {
+            lab: terms.iter().filter_map(|term| term.lab).sum(),
+            terms,
+        }
+    }
+}
+
+impl ResultError {
+    /// The same beyond the paints: every term times the sum of the weights' sizes, at least 1.
+    #[must_use]
+    pub fn stretched(&self, sum_of_sizes: f64) -> Self {
+        let by = sum_of_sizes.max(1.0);
+        Self::of(
+            self.terms
+                .iter()
+                .map(|term| Term {
+                    lab: term.lab.map(|lab| lab * by),
+                    ..*term
+                })
+                .collect(),
+        )
+    }
+}
+
+const CLUSTERS: &str = "measured: W1 of lightness between pixels and clusters, nine of ten of the compared slices are within; \
+                        of several paints the worst";
+const UNKNOWN: &str =
+    "not known: the paint was not clustered here from pictures, or by an older version";
+const TRANSPORT: &str = "bounded: mean excess of the plans' cost over the dual bound; of several pairs of paints the worst";
+const ROUNDING: &str = "bounded: W1 between the boxes and the boxes read back, worst of the slices at the instrument geometries";
+
+/// Error of a paint; nothing is misplaced in a solid color.
+#[must_use]
+pub fn paint_error(file: &PaintFile) -> ResultError {
+    if file.paint.flakes.is_none() {
+        return ResultError::default();
+    }
+    ResultError::of(vec![clusters([file.clustering.as_ref()].into_iter())])
+}
+
+/// Error of a blend at any weights between 0 and 1 that sum to 1: such a mixture moves no color further than its paints.
+#[must_use]
+pub fn blend_error(blend: &Blend) -> ResultError {
+    let report = blend.report();
+    if report.slices == 0 {
+        return ResultError::default();
+    }
+    // A paint without flakes is exact.
+    let with_flakes = blend.clusterings().enumerate().filter(|(k, _)| {
+        let place = blend.place(*k);
+        !report.without_flakes.contains(&place)
+    });
+    let worst = report.pairs.iter().map(|pair| pair.mean_gap);
+    ResultError::of(vec![
+        clusters(with_flakes.map(|(_, clustering)| clustering)),
+        Term {
+            what: "transport",
+            lab: Some(worst.fold(0.0, f64::max)),
+            how: TRANSPORT,
+        },
+    ])
+}
+
+/// Error of a file written from a paint or a blend of this error.
+#[must_use]
+pub fn file_error(of: &ResultError, writing: Option<&WritingError>) -> ResultError {
+    let rounding = writing.map(|writing| Term {
+        what: "rounding",
+        lab: Some(writing.rounding_w1),
+        how: ROUNDING,
+    });
+    ResultError::of(of.terms.iter().copied().chain(rounding).collect())
+}
+
+fn clusters<'a>(of: impl Iterator<Item = Option<&'a Clustering>>) -> Term {
+    let mut worst = Some(0.0_f64);
+    for clustering in of {
+        let own = clustering
+            .and_then(|c| c.error.as_ref())
+            .map(|e| e.lightness_w1.p90);
+        worst = worst.zip(own).map(|(worst, own)| worst.max(own));
+    }
+    Term {
+        what: "clusters",
+        lab: worst,
+        how: if worst.is_some() { CLUSTERS } else { UNKNOWN },
+    }
+}

@@ -1,0 +1,378 @@
+//! The knobs of a profile: every setting by a name that a person can type.
+//!
+//! One list for the command line (`--knob clusters=100`), JSON (`{"preset": "standard", "clusters": 100}`) and addresses
+//! (`profile=standard,clusters=100`). What is left out stays as the preset has it, which is `standard` unless named.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::de::{self, MapAccess, Visitor, value::MapAccessDeserializer};
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Map, Value};
+
+use super::Profile;
+use crate::blend::Order;
+use crate::export::Precision;
+use crate::fit::BoxRule;
+use crate::transport::{Cost, Method};
+
+/// Smoothing of a Sinkhorn transport that names none, as a part of the mean cost.
+const EPSILON: f64 = 0.01;
+
+/// Settings of a profile that were given; the others are the preset's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Knobs {
+    /// Where the other knobs stand: `draft`, `standard` or `reference`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub preset: Option<Preset>,
+    /// Most clusters of a flake slice, 1 to 4096.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clusters: Option<u32>,
+    /// Box of a cluster: `moments` or `tight`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_rule: Option<BoxRule>,
+    /// Every so many-th measured angle is used, 1 to 16.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle_step: Option<u32>,
+    /// Solver of each slice: `exact`, `sinkhorn` or `greedy`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transport: Option<Transport>,
+    /// Smoothing of `sinkhorn`, as a part of the mean cost, 1e-6 to 10.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub epsilon: Option<f64>,
+    /// Cost of moving a color: `distance` in Lab, or `squared`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<CostKnob>,
+    /// Order in which more than two paints are joined: `canonical` or `cheapest`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<Order>,
+    /// Precision of textures: `f32`, `f16` or `8bit`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub precision: Option<Precision>,
+    /// How a bundle's flakes can be drawn: `alias` table, `inverse_cdf` of 500 steps, or `both`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub draw: Option<Draw>,
+    /// Samples per pixel of a picture, 1 to 4096.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples_per_pixel: Option<u32>,
+}
+
+/// Named profiles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Preset {
+    /// Fast.
+    Draft,
+    /// The knee of the fronts.
+    #[default]
+    Standard,
+    /// What the others are measured against.
+    Reference,
+}
+
+/// Solvers of a profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Transport {
+    /// The optimum.
+    Exact,
+    /// Smoothed, stopping at a residual.
+    Sinkhorn,
+    /// A feasible plan with the gap it may have.
+    Greedy,
+}
+
+/// Costs of a profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CostKnob {
+    /// `d`.
+    Distance,
+    /// `d²`.
+    Squared,
+}
+
+/// Ways to draw a flake from a bundle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Draw {
+    /// Alias table: exact.
+    Alias,
+    /// 500 steps, as older shaders read them: the loss is stated.
+    InverseCdf,
+    /// Both.
+    Both,
+}
+
+/// Why there is no such profile.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProfileError {
+    /// Unknown preset.
+    #[error("there is no profile '{0}'; there are draft, standard and reference")]
+    Name(String),
+    /// A number out of range.
+    #[error("{knob} is {value}, accepted is {accepted}")]
+    Range {
+        /// The knob.
+        knob: &'static str,
+        /// What it was set to.
+        value: f64,
+        /// What would be accepted.
+        accepted: &'static str,
+    },
+    /// A smoothing for a solver that has none.
+    #[error("epsilon is set, but transport is not sinkhorn")]
+    Epsilon,
+    /// A knob or a value that there is not.
+    #[error("{0}")]
+    Knob(String),
+}
+
+impl ProfileError {
+    /// The knob that is wrong, where it is one.
+    #[must_use]
+    pub const fn knob(&self) -> Option<&'static str> {
+        match self {
+            Self::Range { knob, .. } => Some(knob),
+            Self::Epsilon => Some("epsilon"),
+            Self::Name(_) | Self::Knob(_) => None,
+        }
+    }
+}
+
+impl Knobs {
+    /// All knobs of a profile.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation)] // in range
+    pub fn of(profile: &Profile) -> Self {
+        let (transport, epsilon) = match profile.blend.method {
+            Method::Sinkhorn { epsilon } => (Transport::Sinkhorn, Some(epsilon)),
+            Method::Greedy => (Transport::Greedy, None),
+            _ => (Transport::Exact, None),
+        };
+        Self {
+            preset: None,
+            clusters: Some(profile.flakes.clusters as u32),
+            box_rule: Some(profile.flakes.box_rule),
+            angle_step: Some(profile.flakes.angle_step as u32),
+            transport: Some(transport),
+            epsilon,
+            cost: Some(match profile.blend.cost {
+                Cost::SquaredDistance => CostKnob::Squared,
+                _ => CostKnob::Distance,
+            }),
+            order: Some(profile.blend.order),
+            precision: Some(profile.export.precision),
+            draw: Some(match (profile.export.alias, profile.export.inverse_cdf) {
+                (true, true) => Draw::Both,
+                (false, true) => Draw::InverseCdf,
+                (_, false) => Draw::Alias,
+            }),
+            samples_per_pixel: Some(profile.samples_per_pixel),
+        }
+    }
+
+    /// The profile that these knobs mean.
+    ///
+    /// # Errors
+    ///
+    /// [`ProfileError`] for a value out of range.
+    pub fn profile(&self) -> Result<Profile, ProfileError> {
+        self.turned(match self.preset.unwrap_or_default() {
+            Preset::Draft => Profile::draft(),
+            Preset::Standard => Profile::standard(),
+            Preset::Reference => Profile::reference(),
+        })
+    }
+
+    /// A profile with these knobs turned.
+    ///
+    /// # Errors
+    ///
+    /// [`ProfileError`] for a value out of range.
+    pub fn turned(&self, mut profile: Profile) -> Result<Profile, ProfileError> {
+        let whole = |knob, value: Option<u32>, most: u32, accepted| match value {
+            Some(value) if !(1..=most).contains(&value) => Err(ProfileError::Range {
+                knob,
+                value: f64::from(value),
+                accepted,
+            }),
+            value => Ok(value),
+        };
+        if let Some(clusters) = whole("clusters", self.clusters, 4096, "1 to 4096")? {
+            profile.flakes.clusters = clusters as usize;
+        }
+        if let Some(step) = whole("angle_step", self.angle_step, 16, "1 to 16")? {
+            profile.flakes.angle_step = step as usize;
+        }
+        if let Some(n) = whole(
+            "samples_per_pixel",
+            self.samples_per_pixel,
+            4096,
+            "1 to 4096",
+        )? {
+            profile.samples_per_pixel = n;
+        }
+        profile.flakes.box_rule = self.box_rule.unwrap_or(profile.flakes.box_rule);
+        profile.blend.method = self.method(profile.blend.method)?;
+        match self.cost {
+            Some(CostKnob::Distance) => profile.blend.cost = Cost::Distance,
+            Some(CostKnob::Squared) => profile.blend.cost = Cost::SquaredDistance,
+            None => {}
+        }
+        profile.blend.order = self.order.unwrap_or(profile.blend.order);
+        profile.export.precision = self.precision.unwrap_or(profile.export.precision);
+        if let Some(draw) = self.draw {
+            profile.export.alias = draw != Draw::InverseCdf;
+            profile.export.inverse_cdf = draw != Draw::Alias;
+        }
+        Ok(profile)
+    }
+
+    fn method(&self, preset: Method) -> Result<Method, ProfileError> {
+        if let Some(epsilon) = self.epsilon.filter(|e| !(1e-6..=10.0).contains(e)) {
+            return Err(ProfileError::Range {
+                knob: "epsilon",
+                value: epsilon,
+                accepted: "1e-6 to 10",
+            });
+        }
+        let method = match self.transport {
+            Some(Transport::Exact) => Method::Exact,
+            Some(Transport::Greedy) => Method::Greedy,
+            Some(Transport::Sinkhorn) => Method::Sinkhorn { epsilon: EPSILON },
+            None => preset,
+        };
+        match (method, self.epsilon) {
+            (method, None) => Ok(method),
+            (Method::Sinkhorn { .. }, Some(epsilon)) => Ok(Method::Sinkhorn { epsilon }),
+            _ => Err(ProfileError::Epsilon),
+        }
+    }
+
+    /// These knobs, and where they say nothing the others.
+    ///
+    /// # Errors
+    ///
+    /// [`ProfileError::Knob`] never: both are knobs already.
+    pub fn over(&self, other: &Self) -> Result<Self, ProfileError> {
+        let object = |knobs: &Self| match serde_json::to_value(knobs) {
+            Ok(Value::Object(map)) => map,
+            _ => Map::new(),
+        };
+        let mut all = object(other);
+        all.extend(object(self));
+        Self::of_object(all)
+    }
+
+    fn of_object(object: Map<String, Value>) -> Result<Self, ProfileError> {
+        serde_json::from_value(Value::Object(object)).map_err(|e| ProfileError::Knob(e.to_string()))
+    }
+
+    /// Reads a preset's name, knobs as text, or knobs as an object.
+    ///
+    /// # Errors
+    ///
+    /// What the deserializer refuses, naming the knob and what would be accepted.
+    pub fn of_name_or_object<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NameOrObject;
+        impl<'de> Visitor<'de> for NameOrObject {
+            type Value = Knobs;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a profile or an object of knobs")
+            }
+
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<Knobs, E> {
+                text.parse().map_err(E::custom)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Knobs, A::Error> {
+                Knobs::deserialize(MapAccessDeserializer::new(map))
+            }
+        }
+        deserializer.deserialize_any(NameOrObject)
+    }
+}
+
+impl FromStr for Knobs {
+    type Err = ProfileError;
+
+    /// A preset, knobs, or both, separated by commas.
+    fn from_str(text: &str) -> Result<Self, ProfileError> {
+        let mut object = Map::new();
+        for part in text.split(',').map(str::trim) {
+            let (name, value) = match part.split_once('=') {
+                Some((name, value)) => (name.trim(), value.trim()),
+                None if super::profile::PRESETS.contains(&part) => ("preset", part),
+                None => return Err(ProfileError::Name(part.to_owned())),
+            };
+            let read = match value.parse::<f64>() {
+                Ok(number) if number.fract() == 0.0 && (0.0..=1e9).contains(&number) => {
+                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked
+                    let whole = number as u64;
+                    Value::from(whole)
+                }
+                Ok(number) => Value::from(number),
+                Err(_) => Value::from(value),
+            };
+            if object.insert(name.to_owned(), read).is_some() {
+                return Err(ProfileError::Knob(format!("{name} is set twice")));
+            }
+        }
+        Self::of_object(object)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn knobs_are_turned_one_by_one_and_the_others_stay() {
+        let profile: Profile =
+            "clusters=100,transport=sinkhorn,epsilon=0.5,cost=squared,draw=alias"
+                .parse()
+                .expect("knobs");
+        let standard = Profile::standard();
+        assert_eq!(profile.flakes.clusters, 100);
+        assert_eq!(profile.blend.method, Method::Sinkhorn { epsilon: 0.5 });
+        assert_eq!(profile.blend.cost, Cost::SquaredDistance);
+        assert!(profile.export.alias && !profile.export.inverse_cdf);
+        assert_eq!(profile.flakes.box_rule, standard.flakes.box_rule);
+        assert_eq!(profile.samples_per_pixel, standard.samples_per_pixel);
+    }
+
+    #[test]
+    fn what_is_no_knob_is_refused_by_name_with_what_there_is() {
+        for (text, named) in [
+            ("cluster=3", "`clusters`"),
+            ("clusters=many", "many"),
+            ("clusters=0", "1 to 4096"),
+            ("clusters=-1", "-1"),
+            ("transport=magic", "`sinkhorn`"),
+            ("best", "reference"),
+            ("epsilon=0.1", "sinkhorn"),
+            ("transport=sinkhorn,epsilon=0", "1e-6"),
+            ("draft,clusters=3,clusters=4", "twice"),
+            ("", "draft"),
+        ] {
+            let error = text.parse::<Profile>().expect_err(text).to_string();
+            assert!(error.contains(named), "{text}: {error}");
+        }
+        let object = serde_json::json!({ "preset": "draft", "samples": 3 });
+        let error = serde_json::from_value::<Profile>(object).expect_err("refused");
+        assert!(error.to_string().contains("samples_per_pixel"), "{error}");
+    }
+
+    #[test]
+    fn later_knobs_win_over_earlier_ones() {
+        let file: Knobs = "draft,clusters=10".parse().expect("knobs");
+        let given: Knobs = "clusters=20".parse().expect("knobs");
+        let profile = given.over(&file).and_then(|k| k.profile()).expect("knobs");
+        assert_eq!(profile.flakes.clusters, 20);
+        assert_eq!(profile.blend.method, Method::Greedy);
+    }
+}

@@ -1,0 +1,102 @@
+//! What a written file loses of the paint: rounding of its corners, and steps of its distribution.
+
+use serde::Serialize;
+
+use super::clustering::luminance_of;
+use super::geometries::{geometries, mixed};
+use crate::color::{ciede2000, luminance};
+use crate::export::{ExportSettings, Rounding, inverse_cdf};
+use crate::paint::{CarPaint, LightnessMixture, Slice, mean_color};
+
+/// How far a file is from the paint that it was written from, over the slices of the six instrument geometries.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct WritingError {
+    /// Distance W1 in Lab between the paint's flakes and those of the file is at most this in any of the slices: what
+    /// moving every box to where its rounded corners are costs.
+    pub rounding_w1: f64,
+    /// CIEDE2000 of the mean color at each geometry.
+    pub instrument: Vec<f64>,
+    /// Relative change of the 99.9th percentile of luminance at each geometry.
+    pub sparkle: Vec<f64>,
+    /// Largest share of draws that show another cluster than they should, where flakes are drawn by the 500 steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inverse_cdf_loss: Option<f64>,
+}
+
+/// What writing a paint with these settings loses. `None` for a solid color.
+#[must_use]
+pub fn writing_error(paint: &CarPaint, settings: &ExportSettings) -> Option<WritingError> {
+    let flakes = paint.flakes.as_ref()?;
+    let rounding = Rounding::of(flakes, settings.precision);
+    let mut error = WritingError::default();
+    let mut loss: f64 = 0.0;
+    for geometry in geometries(paint) {
+        let met = geometry.slices(&flakes.theta_h, &flakes.theta_d);
+        let slices: Vec<(f64, Slice<'_>)> =
+            met.iter().map(|&(w, k)| (w, flakes.slice_at(k))).collect();
+        let written: Vec<(Vec<[f32; 3]>, Vec<[f32; 3]>)> = slices
+            .iter()
+            .map(|(_, slice)| {
+                let back = |c: &[[f32; 3]]| c.iter().map(|&c| rounding.read_back(c)).collect();
+                (back(slice.lower), back(slice.upper))
+            })
+            .collect();
+        let rounded: Vec<(f64, Slice<'_>)> = slices
+            .iter()
+            .zip(&written)
+            .map(|((weight, slice), (lower, upper))| {
+                let probability = slice.probability;
+                (
+                    *weight,
+                    Slice {
+                        probability,
+                        lower,
+                        upper,
+                    },
+                )
+            })
+            .collect();
+        for ((_, slice), (_, other)) in slices.iter().zip(&rounded) {
+            error.rounding_w1 = error.rounding_w1.max(moved(slice, other));
+            if settings.inverse_cdf {
+                let light: Vec<f64> = (0..slice.probability.len())
+                    .map(|k| luminance(mean_color(slice.lower[k], slice.upper[k])))
+                    .collect();
+                loss = loss.max(inverse_cdf(slice.probability, &light).probability_loss);
+            }
+        }
+        let reading = |parts: &[(f64, Slice<'_>)]| {
+            geometry.lab(mixed(parts.iter().map(|(w, slice)| (*w, slice.mean()))))
+        };
+        error
+            .instrument
+            .push(ciede2000(reading(&slices), reading(&rounded)));
+        let top = |parts: &[(f64, Slice<'_>)]| {
+            luminance_of(LightnessMixture::of(parts).quantile(super::clustering::SPARKLE))
+        };
+        let exact = top(&slices);
+        error.sparkle.push(if exact.abs() > 1e-9 {
+            (top(&rounded) / exact - 1.0).abs()
+        } else {
+            0.0
+        });
+    }
+    error.inverse_cdf_loss = settings.inverse_cdf.then_some(loss);
+    Some(error)
+}
+
+/// What moving every box's colors along with its corners costs: no color moves further than the farther corner per axis.
+fn moved(from: &Slice<'_>, to: &Slice<'_>) -> f64 {
+    (0..from.probability.len())
+        .map(|k| {
+            let squared: f64 = (0..3)
+                .map(|axis| {
+                    let low = f64::from(to.lower[k][axis]) - f64::from(from.lower[k][axis]);
+                    let high = f64::from(to.upper[k][axis]) - f64::from(from.upper[k][axis]);
+                    low.abs().max(high.abs()).powi(2)
+                })
+                .sum();
+            from.probability[k] * squared.sqrt()
+        })
+        .sum()
+}

@@ -1,0 +1,66 @@
+//! In which order more than two paints are joined.
+//!
+//! The correspondence of three and more paints is found pair by pair, so it depends on the order (by up to 2 to 3 Lab in
+//! W1). The canonical order is that of the content hashes: cheap, and the same however the paints are named. The cheapest
+//! order is the one whose correspondence costs least over all pairs of paints,
+//!
+//! ```text
+//! Σ_slices Σ_{i<j} Σ_k p_k w(c_k^i, c_k^j)
+//! ```
+//!
+//! at the price of trying `n!/2` orders. Slices are never joined in orders of their own: flakes that are followed from
+//! slice to slice would change partners.
+
+use serde::{Deserialize, Serialize};
+
+/// Order in which paints are joined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Order {
+    /// That of the content hashes.
+    #[default]
+    Canonical,
+    /// The cheapest of all.
+    Cheapest,
+}
+
+/// The orders to try, the canonical one first. Exchanging the first two paints changes no cost: one of the two is tried.
+pub(super) fn orders(paints: usize, order: Order) -> Vec<Vec<usize>> {
+    let canonical: Vec<usize> = (0..paints).collect();
+    if order == Order::Canonical || paints < 3 {
+        return vec![canonical];
+    }
+    let mut all = vec![Vec::new()];
+    for _ in 0..paints {
+        all = all
+            .into_iter()
+            .flat_map(|begun: Vec<usize>| {
+                let left = canonical.iter().filter(|k| !begun.contains(k));
+                left.map(|&k| [&begun[..], &[k]].concat())
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+    }
+    all.retain(|order| order[0] < order[1]);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_order_is_tried_once_and_the_canonical_one_first() {
+        assert_eq!(orders(5, Order::Canonical), [[0, 1, 2, 3, 4]]);
+        assert_eq!(orders(2, Order::Cheapest), [[0, 1]]);
+        for (paints, count) in [(3, 3), (4, 12), (5, 60)] {
+            let all = orders(paints, Order::Cheapest);
+            assert_eq!(all.len(), count);
+            assert_eq!(all[0], (0..paints).collect::<Vec<_>>());
+            let mut distinct = all.clone();
+            distinct.sort();
+            distinct.dedup();
+            assert_eq!(distinct.len(), count);
+        }
+    }
+}

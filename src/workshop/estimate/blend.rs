@@ -1,0 +1,91 @@
+//! Estimates of a blend.
+
+use super::ingest::{Sampled, of_paint, sample};
+use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, timed, write_seconds};
+use crate::accuracy::{Profile, blend_error};
+use crate::blend::Blend;
+use crate::paint::PaintFile;
+use crate::workshop::{IngestOptions, WorkshopError, blend_paints};
+
+/// What blending paints, measurements and samples will take, opening and ingesting them included.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for what cannot be opened, and what [`blend_paints`] refuses.
+pub fn estimate_blend(
+    names: &[String],
+    options: &IngestOptions,
+) -> Result<Estimate, WorkshopError> {
+    let sampled = names
+        .iter()
+        .map(|name| sample(name, options))
+        .collect::<Result<Vec<_>, _>>()?;
+    of_samples(&sampled, &options.profile, true)
+}
+
+/// The same of paints that are there already; the blend is not written to a file of its own.
+///
+/// # Errors
+///
+/// What [`blend_paints`] refuses.
+pub fn estimate_blend_of(
+    paints: &[&PaintFile],
+    profile: &Profile,
+) -> Result<Estimate, WorkshopError> {
+    let sampled: Vec<Sampled> = paints
+        .iter()
+        .map(|&paint| of_paint(paint.clone(), profile, 0.0))
+        .collect();
+    of_samples(&sampled, profile, false)
+}
+
+fn of_samples(
+    sampled: &[Sampled],
+    profile: &Profile,
+    written: bool,
+) -> Result<Estimate, WorkshopError> {
+    let go = |which: usize| -> Result<(f64, Blend), WorkshopError> {
+        let paints: Vec<&PaintFile> = sampled.iter().map(|s| &s.paints[which]).collect();
+        let (seconds, made) = shortest(|| blend_paints(&paints, profile, &|_| ()));
+        Ok((seconds, made?.blend))
+    };
+    let (small, large) = (go(0)?, go(1)?);
+    // Paints of one grid blend on it; of several, on what their angles make together.
+    let axis = |k: usize| {
+        let own = sampled.iter().filter_map(|s| s.angles).map(|a| a[k]);
+        let most = own.clone().max().unwrap_or(1);
+        let together = |blend: &Blend| blend.angles().map_or(1, |a| a[k]);
+        let of_one = sampled
+            .iter()
+            .filter_map(|s| s.paints[1].paint.flakes.as_ref())
+            .map(|f| [f.theta_h.len(), f.theta_d.len()][k])
+            .max()
+            .unwrap_or(1);
+        most as f64 * together(&large.1) as f64 / of_one as f64
+    };
+    let whole = axis(0) * axis(1);
+    let slices = |blend: &Blend| blend.report().slices.max(1) as f64;
+    let at = |small_value: f64, large_value: f64| {
+        extrapolated(
+            (slices(&small.1), small_value),
+            (slices(&large.1), large_value),
+            whole,
+        )
+    };
+    let (encode_small, bytes_small) = timed(|| small.1.to_bytes().len() as f64);
+    let (encode_large, bytes_large) = timed(|| large.1.to_bytes().len() as f64);
+    let bytes = at(bytes_small, bytes_large);
+    let mut stages: Vec<Stage> = sampled.iter().flat_map(|s| s.stages.clone()).collect();
+    stages.push(Stage {
+        stage: "blend",
+        seconds: at(small.0, large.0),
+    });
+    if written {
+        stages.push(Stage {
+            stage: "write",
+            seconds: at(encode_small, encode_large) + write_seconds(bytes),
+        });
+    }
+    let error = EstimatedError::lab(blend_error(&large.1).lab);
+    Ok(Estimate::new(profile, stages, bytes, error))
+}

@@ -1,0 +1,300 @@
+//! Estimates of an ingest, and samples of paints that are still to be ingested.
+
+use std::path::Path;
+
+use super::{
+    Estimate, EstimatedError, SAMPLED_ANGLES, Stage, extrapolated, left_at, shortest, step_for,
+    timed, write_seconds,
+};
+use crate::accuracy::{Profile, clustering_error, paint_error, predicted_clustering_error};
+use crate::fit::{ClusterSettings, FittedFlakes, Thinned, fit_flakes};
+use crate::measurement::{FlakePictures, PackageBase};
+use crate::paint::{
+    CarPaint, Chi, Clustering, ColorTable, Lobe, PaintFile, Provenance, Reflectance,
+    instrument_pairs,
+};
+use crate::workshop::ingest::finish;
+use crate::workshop::thing::{Source, Thing, find, open};
+use crate::workshop::{IngestOptions, Measurement, WorkshopError, open_measurement};
+
+/// Evaluations of a paint that fitting a reflectance table takes as long as.
+const EVALUATIONS_OF_A_FIT: f64 = 1.6e7;
+
+/// A paint that may be still to be ingested, with a few of its angles.
+pub(super) struct Sampled {
+    /// About 4 and about 8 angles on an axis.
+    pub paints: [PaintFile; 2],
+    /// Angles of θh and θd in full; `None` for a solid color.
+    pub angles: Option<[usize; 2]>,
+    /// What opening it in full takes.
+    pub stages: Vec<Stage>,
+}
+
+/// What a measurement will take to ingest.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for what cannot be opened, or is no measurement.
+pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, WorkshopError> {
+    let sampled = sample(name, options)?;
+    let whole = sampled.angles.map_or(1.0, |[h, d]| (h * d) as f64);
+    let size = |paint: &PaintFile| {
+        let flakes = paint.paint.flakes.as_ref();
+        (
+            flakes.map_or(1.0, |f| f.slices() as f64),
+            paint.to_bytes().len() as f64,
+        )
+    };
+    let [small, large] = &sampled.paints;
+    let bytes = extrapolated(size(small), size(large), whole);
+    let mut stages = sampled.stages;
+    stages.push(Stage {
+        stage: "write",
+        seconds: write_seconds(bytes),
+    });
+    let error = EstimatedError::lab(paint_error(large).lab);
+    Ok(Estimate::new(&options.profile, stages, bytes, error))
+}
+
+/// Opens what a name means, of a measurement or of a sample only some angles.
+pub(super) fn sample(name: &str, options: &IngestOptions) -> Result<Sampled, WorkshopError> {
+    match find(name)? {
+        Source::Sample(sample) => {
+            let paint = sample.base();
+            let (seconds, patch) = timed(|| sample.patch());
+            let mut stages = vec![Stage {
+                stage: "simulate",
+                seconds,
+            }];
+            let Some(patch) = patch? else {
+                return Ok(Sampled::solid(finished(sample.name, paint, None), stages));
+            };
+            let (paints, angles) =
+                fitted(&patch, &paint, sample.name, &options.profile, &mut stages)?;
+            Ok(Sampled {
+                paints,
+                angles: Some(angles),
+                stages,
+            })
+        }
+        Source::Path(path) if is_measurement(&path)? => of_measurement(&path, name, options),
+        Source::Path(_) => {
+            let (seconds, thing) = timed(|| open(name, options, &|_| ()));
+            let Thing::Paint(paint) = thing? else {
+                return Err(WorkshopError::input(name, "this is a blend, not a paint"));
+            };
+            Ok(of_paint(*paint, &options.profile, seconds))
+        }
+    }
+}
+
+/// Samples of a paint that is there.
+pub(super) fn of_paint(paint: PaintFile, profile: &Profile, seconds: f64) -> Sampled {
+    let stages = vec![Stage {
+        stage: "read",
+        seconds,
+    }];
+    let Some(flakes) = &paint.paint.flakes else {
+        return Sampled::solid(paint, stages);
+    };
+    let had = paint.clustering.as_ref().map_or(1, |c| c.angle_step).max(1);
+    let step = (profile.flakes.angle_step / had).max(1);
+    let angles = [flakes.theta_h.len(), flakes.theta_d.len()].map(|n| left_at(n, step));
+    let paints = SAMPLED_ANGLES.map(|wanted| {
+        let [rows, columns] = [&flakes.theta_h, &flakes.theta_d].map(|grid| {
+            let left = grid.every(step);
+            let every = step_for(left.len(), wanted);
+            let mut kept: Vec<usize> = left.iter().copied().step_by(every).collect();
+            if kept.last() != left.last() {
+                kept.extend(left.last());
+            }
+            kept
+        });
+        PaintFile {
+            paint: CarPaint {
+                flakes: Some(flakes.only(&rows, &columns)),
+                ..paint.paint.clone()
+            },
+            // As many angles as the profile wants: blending is not to thin them again.
+            clustering: paint.clustering.clone().map(|c| Clustering {
+                angle_step: c.angle_step.max(profile.flakes.angle_step),
+                ..c
+            }),
+            ..paint.clone()
+        }
+    });
+    Sampled {
+        paints,
+        angles: Some(angles),
+        stages,
+    }
+}
+
+impl Sampled {
+    fn solid(paint: PaintFile, stages: Vec<Stage>) -> Self {
+        Self {
+            paints: [paint.clone(), paint],
+            angles: None,
+            stages,
+        }
+    }
+}
+
+fn is_measurement(path: &Path) -> Result<bool, WorkshopError> {
+    let head = crate::workshop::thing::first_bytes(path)?;
+    Ok(!PaintFile::recognises(&head) && !crate::blend::Blend::recognises(&head))
+}
+
+fn of_measurement(
+    path: &Path,
+    name: &str,
+    options: &IngestOptions,
+) -> Result<Sampled, WorkshopError> {
+    let (seconds, measurement) = timed(|| open_measurement(path, options));
+    let mut stages = vec![Stage {
+        stage: "open",
+        seconds,
+    }];
+    let package = match measurement? {
+        Measurement::Package(package) => package,
+        Measurement::Brdf(..) => {
+            stages.push(fit_stage());
+            return Ok(Sampled::solid(finished(name, stand_in(), None), stages));
+        }
+    };
+    let mut paint = stand_in();
+    paint.coat = package.coat;
+    match &package.base {
+        Some(PackageBase::Model {
+            diffuse,
+            lobes,
+            color_table,
+        }) => {
+            paint.diffuse = *diffuse;
+            paint.lobes.clone_from(lobes);
+            paint.color_table = color_table.clone();
+        }
+        _ => stages.push(fit_stage()),
+    }
+    let Some(pictures) = &package.flakes else {
+        return Ok(Sampled::solid(finished(name, paint, None), stages));
+    };
+    let (paints, angles) = fitted(pictures, &paint, name, &options.profile, &mut stages)?;
+    Ok(Sampled {
+        paints,
+        angles: Some(angles),
+        stages,
+    })
+}
+
+/// Fits a few angles of pictures, twice, and what all of them will take.
+fn fitted(
+    pictures: &dyn FlakePictures,
+    base: &CarPaint,
+    name: &str,
+    profile: &Profile,
+    stages: &mut Vec<Stage>,
+) -> Result<([PaintFile; 2], [usize; 2]), WorkshopError> {
+    let settings = ClusterSettings {
+        angle_step: 1,
+        ..profile.flakes
+    };
+    let every = profile.flakes.angle_step;
+    let angles = [pictures.theta_h(), pictures.theta_d()].map(|grid| left_at(grid.len(), every));
+    let go = |wanted: usize| -> Result<(f64, FittedFlakes), WorkshopError> {
+        let steps = angles.map(|n| every * step_for(n, wanted));
+        let thinned = Thinned::by_steps(pictures, steps);
+        let (seconds, fitted) = timed(|| {
+            fit_flakes(&thinned, &settings, &|_, _| {
+                std::ops::ControlFlow::Continue(())
+            })
+        });
+        Ok((seconds, fitted.map_err(|e| WorkshopError::input(name, e))?))
+    };
+    // The first go warms up.
+    go(SAMPLED_ANGLES[0])?;
+    let (small, large) = (go(SAMPLED_ANGLES[0])?, go(SAMPLED_ANGLES[1])?);
+    let size = |fitted: &FittedFlakes| fitted.flakes.slices() as f64;
+    let whole = (angles[0] * angles[1]) as f64;
+    stages.push(Stage {
+        stage: "flakes",
+        seconds: extrapolated((size(&small.1), small.0), (size(&large.1), large.0), whole),
+    });
+    let mut paints = [small.1, large.1].map(|fitted| {
+        let paint = CarPaint {
+            flakes: Some(fitted.flakes),
+            ..base.clone()
+        };
+        finished(
+            name,
+            paint,
+            Some(Clustering {
+                angle_step: every,
+                ..fitted.clustering
+            }),
+        )
+    });
+    // The very slices that the ingest will be compared on.
+    let (seconds, _) = timed(|| clustering_error(pictures, &paints[1].paint));
+    stages.push(Stage {
+        stage: "compare",
+        seconds,
+    });
+    let error = predicted_clustering_error(pictures, base, &profile.flakes);
+    for paint in &mut paints {
+        if let Some(clustering) = &mut paint.clustering {
+            clustering.error.clone_from(&error);
+        }
+    }
+    Ok((paints, angles))
+}
+
+/// A paint of one color, where only the size of a paint matters.
+fn stand_in() -> CarPaint {
+    CarPaint {
+        coat: None,
+        diffuse: [0.2; 3],
+        lobes: vec![
+            Lobe {
+                weight: [0.05; 3],
+                alpha: 0.3,
+                f0: 0.5,
+            };
+            3
+        ],
+        color_table: ColorTable::white(),
+        flakes: None,
+    }
+}
+
+fn finished(name: &str, paint: CarPaint, clustering: Option<Clustering>) -> PaintFile {
+    let nothing = Vec::new();
+    finish(
+        name.to_owned(),
+        Provenance::default(),
+        paint,
+        None,
+        clustering,
+        nothing,
+    )
+}
+
+/// What fitting a reflectance table takes.
+fn fit_stage() -> Stage {
+    const EVALUATIONS: u32 = 100_000;
+    let paint = stand_in();
+    let reflectance = Reflectance::new(&paint);
+    let pairs = instrument_pairs();
+    let (seconds, _) = shortest(|| {
+        (0..EVALUATIONS)
+            .map(|k| {
+                let (wi, wo) = pairs[k as usize % pairs.len()];
+                reflectance.evaluate(wi, wo, Chi::Table)[1]
+            })
+            .sum::<f64>()
+    });
+    Stage {
+        stage: "fit",
+        seconds: seconds * EVALUATIONS_OF_A_FIT / f64::from(EVALUATIONS),
+    }
+}

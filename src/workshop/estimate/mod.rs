@@ -1,0 +1,178 @@
+//! What a request will cost and how accurate it will be, before it is made.
+//!
+//! A request is estimated by doing a small part of it on this machine, now: every k-th angle of the very paints, a few
+//! pixels of the very picture. Time and bytes of two such samples, one larger than the other, give what is fixed and what
+//! grows with the work; the error is measured on the larger sample. A sample takes a few hundredths of the time of the
+//! whole, and as it runs under the same load, the estimate is of this machine as it is. Only the fit of a bare
+//! reflectance table cannot be done in part: it costs as much as a number of evaluations of a paint, which are timed.
+//!
+//! Results never depend on an estimate; what is picked for a time limit does.
+
+mod blend;
+mod ingest;
+mod preview;
+mod realise;
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+pub use blend::{estimate_blend, estimate_blend_of};
+pub use ingest::estimate_ingest;
+pub use preview::estimate_preview;
+pub use realise::estimate_realise;
+
+use crate::accuracy::Profile;
+
+/// What a request will cost.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Name of the profile it is for.
+    pub profile: &'static str,
+    /// Its knobs.
+    pub knobs: Profile,
+    /// Wall time, seconds.
+    pub seconds: f64,
+    /// The same by stage.
+    pub stages: Vec<Stage>,
+    /// Size of the answer.
+    pub bytes: u64,
+    /// How far the answer is from the reference profile's.
+    pub error: EstimatedError,
+}
+
+/// Time of one stage.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Stage {
+    /// What is done.
+    pub stage: &'static str,
+    /// Wall time, seconds.
+    pub seconds: f64,
+}
+
+/// An error to expect.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct EstimatedError {
+    /// How much.
+    pub value: f64,
+    /// Of what: `Lab` (misplaced colors of flakes) or `CIEDE2000` (mean over a picture's pixels, by sampling).
+    pub unit: &'static str,
+}
+
+impl EstimatedError {
+    fn lab(value: f64) -> Self {
+        let unit = "Lab";
+        Self { value, unit }
+    }
+}
+
+impl Estimate {
+    fn new(profile: &Profile, stages: Vec<Stage>, bytes: f64, error: EstimatedError) -> Self {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a size
+        let bytes = bytes.max(0.0).round() as u64;
+        Self {
+            profile: profile.name(),
+            knobs: *profile,
+            seconds: stages.iter().map(|stage| stage.seconds).sum(),
+            stages,
+            bytes,
+            error,
+        }
+    }
+}
+
+/// Angles on an axis of the smaller and of the larger sample.
+const SAMPLED_ANGLES: [usize; 2] = [3, 6];
+
+/// Step at which an axis of so many angles is left with about `wanted`.
+fn step_for(angles: usize, wanted: usize) -> usize {
+    (angles - 1).div_ceil((wanted - 1).max(1)).max(1)
+}
+
+/// Angles that are left of so many at a step; the last is always kept.
+fn left_at(angles: usize, step: usize) -> usize {
+    (angles - 1).div_ceil(step) + 1
+}
+
+/// Seconds that something takes, and what it gives.
+fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let begun = Instant::now();
+    let made = work();
+    (begun.elapsed().as_secs_f64(), made)
+}
+
+/// The shortest of three goes: what the work takes when nothing comes between.
+fn shortest<T>(mut work: impl FnMut() -> T) -> (f64, T) {
+    let (mut least, mut made) = timed(&mut work);
+    for _ in 0..2 {
+        let (seconds, again) = timed(&mut work);
+        if seconds < least {
+            (least, made) = (seconds, again);
+        }
+    }
+    (least, made)
+}
+
+/// A line through two samples, (size, value) each, read at another size: neither part of it is negative.
+fn extrapolated(small: (f64, f64), large: (f64, f64), size: f64) -> f64 {
+    let per_unit = if large.0 > small.0 {
+        (large.1 - small.1) / (large.0 - small.0)
+    } else {
+        large.1 / large.0.max(1.0)
+    };
+    let per_unit = per_unit.max(0.0);
+    let fixed = large.1 - per_unit * large.0;
+    if fixed < 0.0 {
+        return large.1 / large.0.max(1.0) * size;
+    }
+    fixed + per_unit * size
+}
+
+/// Seconds that writing a file of this size durably takes, by writing a small and a larger one.
+fn write_seconds(bytes: f64) -> f64 {
+    use std::io::Write as _;
+    let write = |length: usize| {
+        let content = vec![0x5a_u8; length];
+        shortest(|| -> std::io::Result<()> {
+            let mut file = tempfile::NamedTempFile::new()?;
+            file.write_all(&content)?;
+            file.as_file().sync_all()
+        })
+        .0
+    };
+    const SMALL: u16 = 1 << 12;
+    const LARGE: u32 = 1 << 20;
+    extrapolated(
+        (f64::from(SMALL), write(usize::from(SMALL))),
+        (f64::from(LARGE), write(LARGE as usize)),
+        bytes,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_through_two_samples_has_no_negative_part() {
+        assert_eq!(extrapolated((1.0, 3.0), (3.0, 5.0), 10.0), 12.0);
+        assert_eq!(extrapolated((1.0, 6.0), (3.0, 5.0), 10.0), 5.0);
+        assert_eq!(extrapolated((1.0, 1.0), (2.0, 4.0), 10.0), 20.0);
+    }
+
+    #[test]
+    fn a_step_leaves_as_many_angles_as_a_grid_keeps() {
+        for angles in 1..40 {
+            let grid =
+                crate::paint::AngleGrid::new((0..angles).map(|k| f64::from(k) * 2.0).collect())
+                    .expect("ascends");
+            for step in 1..9 {
+                assert_eq!(
+                    left_at(angles as usize, step),
+                    grid.every(step).len(),
+                    "{angles} {step}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Estimates of a picture.
+
+use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, timed, write_seconds};
+use crate::accuracy::Profile;
+use crate::blend::RealisationWeights;
+use crate::paint::Limits;
+use crate::workshop::previewing::{PictureFormat, PreviewOptions, preview, sampling};
+use crate::workshop::{Thing, WorkshopError};
+
+/// Pixels on the longer side of the two samples.
+const SIDES: [u32; 2] = [20, 56];
+
+/// Samples per pixel from which on time is proportional to them.
+const ENOUGH: u32 = 8;
+
+/// What drawing a paint, or a blend at the given weights, will take; opening it not included.
+///
+/// # Errors
+///
+/// What [`preview`] refuses.
+pub fn estimate_preview(
+    thing: &Thing,
+    weights: Option<&RealisationWeights>,
+    options: &PreviewOptions,
+    format: PictureFormat,
+    limits: &Limits,
+    profile: &Profile,
+    written: bool,
+) -> Result<Estimate, WorkshopError> {
+    let [width, height] = options.size.map(f64::from);
+    let mut samples = Vec::new();
+    let batches = |spp: u32| f64::from(spp.div_ceil(ENOUGH));
+    for side in SIDES {
+        let scale = (f64::from(side) / width.max(height)).min(1.0);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pixels
+        let size = options
+            .size
+            .map(|n| ((f64::from(n) * scale).round() as u32).max(1));
+        let few = PreviewOptions {
+            size,
+            samples_per_pixel: options.samples_per_pixel.min(2 * ENOUGH),
+            ..options.clone()
+        };
+        let (seconds, made) = shortest(|| preview(thing, weights, &few, format, limits, &|_| ()));
+        let pixels = f64::from(size[0]) * f64::from(size[1]);
+        samples.push((
+            pixels * batches(few.samples_per_pixel),
+            seconds,
+            (pixels, made?.bytes.len() as f64),
+        ));
+    }
+    let work = width * height * batches(options.samples_per_pixel);
+    let seconds = extrapolated(
+        (samples[0].0, samples[0].1),
+        (samples[1].0, samples[1].1),
+        work,
+    );
+    let bytes = extrapolated(samples[0].2, samples[1].2, width * height);
+    let (_, error) = timed(|| sampling(thing, weights, options, limits));
+    let mut stages = vec![Stage {
+        stage: "draw",
+        seconds,
+    }];
+    if written {
+        stages.push(Stage {
+            stage: "write",
+            seconds: write_seconds(bytes),
+        });
+    }
+    let error = EstimatedError {
+        value: error?.mean_delta_e,
+        unit: "CIEDE2000",
+    };
+    let drawn_with = Profile {
+        samples_per_pixel: options.samples_per_pixel,
+        ..*profile
+    };
+    Ok(Estimate::new(&drawn_with, stages, bytes, error))
+}

@@ -1,0 +1,90 @@
+//! Estimates of a realisation.
+
+use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, step_for, write_seconds};
+use crate::accuracy::Profile;
+use crate::blend::{Blend, RealisationWeights};
+use crate::paint::{CarPaint, PaintFile};
+use crate::workshop::realising::{Format, realise};
+use crate::workshop::{Thing, WorkshopError};
+
+/// Angles on an axis of the two samples: writing has a fixed part that small samples say little of.
+const ANGLES: [usize; 2] = [4, 9];
+
+/// What writing a paint, or a blend at the given weights, will take; opening it not included.
+///
+/// # Errors
+///
+/// What [`realise`] refuses.
+pub fn estimate_realise(
+    thing: &Thing,
+    weights: Option<&RealisationWeights>,
+    format: Format,
+    profile: &Profile,
+    written: bool,
+) -> Result<Estimate, WorkshopError> {
+    let whole = slices(thing);
+    let mut samples = Vec::new();
+    for wanted in ANGLES {
+        let sample = sample_of(thing, wanted);
+        let (seconds, made) = shortest(|| realise(&sample, weights, format, profile));
+        samples.push((slices(&sample), seconds, made?));
+    }
+    let at = |get: &dyn Fn(usize) -> f64| {
+        extrapolated((samples[0].0, get(0)), (samples[1].0, get(1)), whole)
+    };
+    let bytes = at(&|k| samples[k].2.bytes.len() as f64);
+    let mut stages = vec![Stage {
+        stage: "realise",
+        seconds: at(&|k| samples[k].1),
+    }];
+    if written {
+        stages.push(Stage {
+            stage: "write",
+            seconds: write_seconds(bytes),
+        });
+    }
+    let report = &samples[1].2.report;
+    let error = report.pointer("/accuracy/error/lab");
+    let error = error.and_then(serde_json::Value::as_f64).unwrap_or(0.0);
+    Ok(Estimate::new(
+        profile,
+        stages,
+        bytes,
+        EstimatedError::lab(error),
+    ))
+}
+
+fn slices(thing: &Thing) -> f64 {
+    let count = match thing {
+        Thing::Paint(file) => file.paint.flakes.as_ref().map_or(1, |f| f.slices()),
+        Thing::Blend(blend) => blend.angles().map_or(1, |[h, d]| h * d),
+    };
+    count as f64
+}
+
+fn sample_of(thing: &Thing, wanted: usize) -> Thing {
+    match thing {
+        Thing::Paint(file) => {
+            let flakes = file.paint.flakes.as_ref().map(|f| {
+                let rows = f.theta_h.every(step_for(f.theta_h.len(), wanted));
+                let columns = f.theta_d.every(step_for(f.theta_d.len(), wanted));
+                f.only(&rows, &columns)
+            });
+            Thing::Paint(Box::new(PaintFile {
+                paint: CarPaint {
+                    flakes,
+                    ..file.paint.clone()
+                },
+                ..(**file).clone()
+            }))
+        }
+        Thing::Blend(blend) => Thing::Blend(Box::new(thinned(blend, wanted))),
+    }
+}
+
+fn thinned(blend: &Blend, wanted: usize) -> Blend {
+    match blend.angles() {
+        Some(angles) => blend.thinned(angles.map(|n| step_for(n, wanted))),
+        None => blend.clone(),
+    }
+}
