@@ -4,6 +4,7 @@
 //! a bug; `--json` prints one object on stdout; progress and errors go to stderr; files appear whole or not at all.
 
 mod blend;
+mod bundle;
 mod evaluate;
 mod ingest;
 mod output;
@@ -52,6 +53,7 @@ enum Command {
     Show(show::Show),
     Blend(blend::Blend),
     Realise(realise::Realise),
+    Bundle(bundle::Bundle),
     Preview(preview::Preview),
     Texels(texels::Texels),
     Evaluate(evaluate::Evaluate),
@@ -64,6 +66,7 @@ Examples:
   carpaint blend sample:polaris_silber sample:ford_f8 --out two.blend
   carpaint preview two.blend --weights 0.5,0.5 --out between.png
   carpaint realise two.blend --weights 0.5,0.5 --out between.zip
+  carpaint bundle two.blend --out sliders.zip
   carpaint serve";
 
 /// Runs the command line of this process.
@@ -103,6 +106,7 @@ fn start(cli: Cli) -> Result<(), WorkshopError> {
         Command::Show(command) => command.run(json),
         Command::Blend(command) => command.run(json),
         Command::Realise(command) => command.run(json),
+        Command::Bundle(command) => command.run(json),
         Command::Preview(command) => command.run(json),
         Command::Texels(command) => command.run(json),
         Command::Evaluate(command) => command.run(json),

@@ -233,6 +233,7 @@ pub(super) fn links(id: &str, paints: &[String], options: &BlendOptions) -> Valu
             "paints": paints.iter().map(|paint| format!("/v1/paints/{paint}")).collect::<Vec<_>>(),
             "preview": format!("{base}/preview.png?weights={weights}"),
             "bundle": format!("{base}/realisation.zip?weights={weights}"),
+            "slider_bundle": format!("{base}/bundle.zip"),
             "glb": format!("{base}/realisation.glb?weights={weights}"),
         }
     })

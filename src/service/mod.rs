@@ -10,6 +10,7 @@
 
 mod answer;
 mod app;
+mod blend_bundles;
 mod blends;
 mod docs;
 mod documents;

@@ -23,7 +23,7 @@ use crate::blend::RealisationWeights;
 pub struct ProfileQuery {
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,precision=f32,draw=alias`.
     #[param(value_type = Option<String>, example = "standard")]
-    profile: Option<ProfileText>,
+    pub(super) profile: Option<ProfileText>,
 }
 
 /// A blend at some weights, as a file.

@@ -19,7 +19,8 @@ use super::envelope::envelope;
 use super::extract::JSON_BYTES;
 use super::works::Works;
 use super::{
-    ServiceConfig, blends, docs, home, jobs, operations, paints, previews, realisations, runner,
+    ServiceConfig, blend_bundles, blends, docs, home, jobs, operations, paints, previews,
+    realisations, runner,
 };
 use crate::store::StoreError;
 
@@ -69,6 +70,7 @@ pub fn router(app: App) -> Router {
         .route("/v1/paints/{id}/preview.{format}", get(previews::of_paint))
         .route("/v1/blends", axum::routing::post(blends::create))
         .route("/v1/blends/{id}", get(blends::show))
+        .route("/v1/blends/{id}/bundle.zip", get(blend_bundles::bundle))
         .route(
             "/v1/blends/{id}/realisation.{format}",
             get(realisations::of_blend),

@@ -179,6 +179,13 @@ pub trait Works: Debug + Send + Sync {
         profile: &Profile,
     ) -> Result<Vec<u8>, WorkError>;
 
+    /// All paints of a blend become one texture bundle.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for a thing that is no blend.
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError>;
+
     /// A paint, or a blend at some weights, becomes a picture.
     ///
     /// # Errors

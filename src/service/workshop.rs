@@ -100,6 +100,10 @@ impl Works for Workshop {
         Ok(workshop::realise(thing, weights, format, profile)?.bytes)
     }
 
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError> {
+        Ok(workshop::bundle_blend(blend, profile)?.bytes)
+    }
+
     fn preview(
         &self,
         thing: &Thing,

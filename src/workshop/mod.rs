@@ -4,6 +4,7 @@
 //! a function that hears the share done. Every failure is a [`WorkshopError`] that says whose fault it is.
 
 mod blending;
+mod bundling;
 mod content;
 mod describing;
 mod error;
@@ -17,6 +18,7 @@ mod selftest;
 mod thing;
 
 pub use blending::{Blended, blend_paints};
+pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};
 pub use error::{Fault, WorkshopError};
 pub use estimate::{
@@ -33,3 +35,6 @@ pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
 pub use selftest::{Check, selftest};
 pub use thing::{Source, Thing, find, open, open_paint, read};
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,7 @@
 //! The real binary, as scripts call it.
 
+mod bundle;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

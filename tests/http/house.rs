@@ -124,6 +124,10 @@ impl Works for Pretend {
         Ok(format!("{format:?} {diffuse:?}").into_bytes())
     }
 
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError> {
+        carpaint::service::Workshop::new(carpaint::paint::Limits::default()).bundle(blend, profile)
+    }
+
     fn preview(
         &self,
         thing: &Thing,

@@ -12,7 +12,8 @@ use super::answer::{Answer, Keep};
 use super::extract::Address;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::{
-    blends, documents, jobs, operations, paints, previews, profile, realisations, runner, works,
+    blend_bundles, blends, documents, jobs, operations, paints, previews, profile, realisations,
+    runner, works,
 };
 
 /// Only what this service itself serves.
@@ -29,7 +30,7 @@ const POLICY: &str =
     ),
     paths(
         paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete,
-        blends::create, blends::show,
+        blends::create, blends::show, blend_bundles::bundle,
         realisations::of_blend, realisations::of_paint,
         previews::of_blend, previews::of_paint,
         jobs::show, jobs::events, jobs::cancel,
