@@ -11,7 +11,7 @@ use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
 use crate::accuracy::blend_error;
-use crate::workshop::{WorkshopError, blend_paints, open_paint};
+use crate::workshop::{Work, WorkshopError, blend_paints, open_paint};
 
 /// Find how the flakes of 2 to 5 paints become one another, and keep it as a .blend.
 ///
@@ -33,7 +33,14 @@ pub struct Blend {
 
 impl Blend {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        let options = ReadingArgs::default().options(None, &self.profile)?;
+        let mut options = ReadingArgs::default().options(None, &self.profile)?;
+        let picked = self.profile.pick(&Work::BlendNames {
+            names: &self.inputs,
+            options: &options,
+        })?;
+        if let Some(picked) = &picked {
+            options.profile = *picked.profile();
+        }
         let start = Instant::now();
         let mut paints = Vec::with_capacity(self.inputs.len());
         for input in &self.inputs {
@@ -65,8 +72,11 @@ impl Blend {
             let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
             return output::print_json(
                 &json!({ "out": self.out, "paints": names, "profile": options.profile.name(), "correspondence": report,
-                    "error": blend_error(&made.blend), "notes": made.notes }),
+                    "error": blend_error(&made.blend), "picked": picked, "notes": made.notes }),
             );
+        }
+        if let Some(picked) = &picked {
+            eprintln!("target {}", picked.line());
         }
         for note in &made.notes {
             eprintln!("note: {note}");

@@ -4,6 +4,7 @@
 //! a bug; `--json` prints one object on stdout; progress and errors go to stderr; files appear whole or not at all.
 
 mod blend;
+mod estimate;
 mod evaluate;
 mod ingest;
 mod output;
@@ -60,6 +61,7 @@ enum Command {
     Preview(preview::Preview),
     Texels(texels::Texels),
     Evaluate(evaluate::Evaluate),
+    Estimate(estimate::Estimate),
     Samples(samples::Samples),
 }
 
@@ -109,6 +111,7 @@ fn start(cli: Cli) -> Result<(), WorkshopError> {
         Command::Preview(command) => command.run(json),
         Command::Texels(command) => command.run(json),
         Command::Evaluate(command) => command.run(json),
+        Command::Estimate(command) => command.run(json),
         Command::Samples(command) => command.run(json),
     }
 }

@@ -8,12 +8,14 @@
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
 //! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`).
 
+mod accuracy;
 mod answer;
 mod app;
 mod blends;
 mod docs;
 mod documents;
 mod envelope;
+mod estimates;
 mod extract;
 mod home;
 mod ids;
@@ -29,6 +31,7 @@ mod realisations;
 mod runner;
 mod samples;
 mod serve;
+mod targets;
 mod waiting;
 mod weights;
 mod workbench;
@@ -40,8 +43,8 @@ pub use docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
-    Fault, Format, IngestOrder, Layout, Picture, PictureFormat, Progress, Scene, ThetaH, Thing,
-    View, WorkError, Works,
+    Asked, Estimate, Fault, Format, IngestOrder, Layout, Picked, Picture, PictureFormat, Progress,
+    Scene, Target, ThetaH, Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 

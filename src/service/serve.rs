@@ -19,7 +19,8 @@ use super::envelope::envelope;
 use super::extract::JSON_BYTES;
 use super::works::Works;
 use super::{
-    ServiceConfig, blends, docs, home, jobs, operations, paints, previews, realisations, runner,
+    ServiceConfig, accuracy, blends, docs, estimates, home, jobs, operations, paints, previews,
+    realisations, runner,
 };
 use crate::store::StoreError;
 
@@ -74,6 +75,8 @@ pub fn router(app: App) -> Router {
             get(realisations::of_blend),
         )
         .route("/v1/blends/{id}/preview.{format}", get(previews::of_blend))
+        .route("/v1/estimates", axum::routing::post(estimates::create))
+        .route("/v1/accuracy", get(accuracy::show))
         .route("/v1/jobs/{id}", get(jobs::show).delete(jobs::cancel))
         .route("/v1/jobs/{id}/events", get(jobs::events))
         .route("/healthz", get(operations::healthz))

@@ -12,18 +12,17 @@ mod ingest;
 mod previewing;
 mod realising;
 mod samples;
+mod target;
 mod thing;
 
 pub use blending::{Blended, blend_paints};
 pub use describing::{describe_blend, describe_paint};
 pub use error::{Fault, WorkshopError};
-pub use estimate::{
-    Estimate, EstimatedError, Stage, estimate_blend, estimate_blend_of, estimate_ingest, estimate_preview,
-    estimate_realise,
-};
+pub use estimate::{Estimate, EstimatedError, Stage, Work, sample_to_estimate};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{IngestOptions, Measurement, ingest, ingest_upload, open_measurement};
 pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
+pub use target::{Picked, Target};
 pub use thing::{Source, Thing, find, open, open_paint, read};

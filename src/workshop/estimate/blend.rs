@@ -12,7 +12,10 @@ use crate::workshop::{IngestOptions, WorkshopError, blend_paints};
 /// # Errors
 ///
 /// [`WorkshopError`] for what cannot be opened, and what [`blend_paints`] refuses.
-pub fn estimate_blend(names: &[String], options: &IngestOptions) -> Result<Estimate, WorkshopError> {
+pub fn estimate_blend(
+    names: &[String],
+    options: &IngestOptions,
+) -> Result<Estimate, WorkshopError> {
     let sampled = names
         .iter()
         .map(|name| sample(name, options))

@@ -10,7 +10,8 @@ use crate::accuracy::{Profile, clustering_error, paint_error, predicted_clusteri
 use crate::fit::{ClusterSettings, FittedFlakes, Thinned, fit_flakes};
 use crate::measurement::{FlakePictures, PackageBase};
 use crate::paint::{
-    CarPaint, Chi, Clustering, ColorTable, Lobe, PaintFile, Provenance, Reflectance, instrument_pairs,
+    CarPaint, Chi, Clustering, ColorTable, Lobe, PaintFile, Provenance, Reflectance,
+    instrument_pairs,
 };
 use crate::workshop::ingest::finish;
 use crate::workshop::thing::{Source, Thing, find, open};
@@ -53,6 +54,31 @@ pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, 
     });
     let error = EstimatedError::lab(paint_error(large).lab);
     Ok(Estimate::new(&options.profile, stages, bytes, error))
+}
+
+/// What a name means, to estimate work on it: files that are paints or blends as they are, of measurements and samples a
+/// few angles, with what opening them in full will take.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for what cannot be opened.
+pub fn sample_to_estimate(
+    name: &str,
+    options: &IngestOptions,
+) -> Result<(Vec<Stage>, Thing), WorkshopError> {
+    if let Source::Path(path) = find(name)?
+        && !is_measurement(&path)?
+    {
+        let (seconds, thing) = timed(|| open(name, options, &|_| ()));
+        let read = Stage {
+            stage: "read",
+            seconds,
+        };
+        return Ok((vec![read], thing?));
+    }
+    let Sampled { paints, stages, .. } = sample(name, options)?;
+    let [_, paint] = paints;
+    Ok((stages, Thing::Paint(Box::new(paint))))
 }
 
 /// Opens what a name means, of a measurement or of a sample only some angles.
@@ -158,10 +184,7 @@ fn of_measurement(
         Measurement::Package(package) => package,
         Measurement::Brdf(..) => {
             stages.push(fit_stage());
-            return Ok(Sampled::solid(
-                finished(name, stand_in(), None),
-                stages,
-            ));
+            return Ok(Sampled::solid(finished(name, stand_in(), None), stages));
         }
     };
     let mut paint = stand_in();
@@ -220,11 +243,7 @@ fn fitted(
     let whole = (angles[0] * angles[1]) as f64;
     stages.push(Stage {
         stage: "flakes",
-        seconds: extrapolated(
-            (size(&small.1), small.0),
-            (size(&large.1), large.0),
-            whole,
-        ),
+        seconds: extrapolated((size(&small.1), small.0), (size(&large.1), large.0), whole),
     });
     let mut paints = [small.1, large.1].map(|fitted| {
         let paint = CarPaint {

@@ -1,8 +1,6 @@
 //! Estimates of a realisation.
 
-use super::{
-    Estimate, EstimatedError, Stage, extrapolated, shortest, step_for, write_seconds,
-};
+use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, step_for, write_seconds};
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::paint::{CarPaint, PaintFile};
