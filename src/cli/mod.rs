@@ -15,6 +15,7 @@ mod realise;
 mod samples;
 mod serve;
 mod show;
+mod study;
 mod texels;
 mod weights;
 
@@ -62,6 +63,7 @@ enum Command {
     Texels(texels::Texels),
     Evaluate(evaluate::Evaluate),
     Estimate(estimate::Estimate),
+    Study(study::Study),
     Samples(samples::Samples),
 }
 
@@ -112,6 +114,7 @@ fn start(cli: Cli) -> Result<(), WorkshopError> {
         Command::Texels(command) => command.run(json),
         Command::Evaluate(command) => command.run(json),
         Command::Estimate(command) => command.run(json),
+        Command::Study(command) => command.run(json),
         Command::Samples(command) => command.run(json),
     }
 }

@@ -24,6 +24,11 @@ impl Progress {
         Self { bar }
     }
 
+    /// Says what is being done now.
+    pub fn says(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
+    }
+
     /// Moves the bar to a share of 0 to 1.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a bar of a thousand steps
     pub fn at(&self, share: f32) {

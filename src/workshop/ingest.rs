@@ -257,6 +257,14 @@ fn ingest_package(
     ))
 }
 
+/// Fits the table of a package inside its coat.
+pub(super) fn fitted_base(base: &PackageBase, coat: Option<Coat>) -> Result<CarPaint, String> {
+    let table = table_of(base)?;
+    let fitted = fit_base(&table, CoatChoice::Inside(coat.map_or(1.0, |c| c.ior)))
+        .map_err(|e| e.to_string())?;
+    Ok(base_paint(&fitted, coat))
+}
+
 /// The measured table of a package.
 pub(super) fn table_of(base: &PackageBase) -> Result<HalfAngleTable, String> {
     let PackageBase::Table {

@@ -12,6 +12,7 @@ mod ingest;
 mod previewing;
 mod realising;
 mod samples;
+mod study;
 mod target;
 mod thing;
 
@@ -24,5 +25,6 @@ pub use ingest::{IngestOptions, Measurement, ingest, ingest_upload, open_measure
 pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
+pub use study::{StudyOptions, study};
 pub use target::{Picked, Target};
 pub use thing::{Source, Thing, find, open, open_paint, read};

@@ -47,7 +47,13 @@ pub struct Front {
 impl Front {
     /// Orders points by time, finds the front and its knee.
     #[must_use]
-    pub fn new(work: &str, about: &str, error_is: &str, unit: &str, mut points: Vec<Point>) -> Self {
+    pub fn new(
+        work: &str,
+        about: &str,
+        error_is: &str,
+        unit: &str,
+        mut points: Vec<Point>,
+    ) -> Self {
         points.sort_by(|x, y| {
             x.seconds
                 .total_cmp(&y.seconds)
@@ -99,11 +105,7 @@ impl Front {
             .filter(|p| p.seconds <= point.seconds)
             .map(|p| p.error)
             .fold(point.error, f64::min);
-        if best > 0.0 {
-            point.error / best
-        } else {
-            1.0
-        }
+        if best > 0.0 { point.error / best } else { 1.0 }
     }
 }
 
@@ -158,6 +160,9 @@ mod tests {
         assert_eq!(on, ["fast", "good", "slow"]);
         assert_eq!(front.knee, "good");
         let beaten = &front.points[2];
-        assert!((front.above_front(beaten) - 4.5).abs() < 1e-12, "{beaten:?}");
+        assert!(
+            (front.above_front(beaten) - 4.5).abs() < 1e-12,
+            "{beaten:?}"
+        );
     }
 }

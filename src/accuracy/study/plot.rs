@@ -105,7 +105,7 @@ fn begin(title: &str, subtitle: &str) -> String {
     svg
 }
 
-fn axes(svg: &mut String, x: &Axis, y: &Axis, x_name: &str, y_name: &str, millis: bool) {
+fn axes(svg: &mut String, x: &Axis, y: &Axis, x_name: &str, y_name: &str) {
     let [left, right, top, bottom] = FIELD;
     for tick in y.ticks() {
         let at = y.at(tick);
@@ -115,7 +115,7 @@ fn axes(svg: &mut String, x: &Axis, y: &Axis, x_name: &str, y_name: &str, millis
              text-anchor=\"end\" fill=\"#555\">{}</text>",
             left - 8.0,
             at + 4.5,
-            number(if millis { tick * 1e3 } else { tick })
+            number(tick)
         );
     }
     for tick in x.ticks() {
@@ -145,12 +145,15 @@ fn of_front(front: &Front) -> String {
     let [left, right, top, bottom] = FIELD;
     let x = Axis::new(front.points.iter().map(|p| p.seconds * 1e3), left, right);
     let y = Axis::new(front.points.iter().map(|p| p.error), bottom, top);
-    let mut svg = begin(&front.about, "nothing measured lies below the line: the Pareto front");
+    let mut svg = begin(
+        &front.about,
+        "nothing measured lies below the line: the Pareto front",
+    );
     let (x_name, y_name) = (
         "time, milliseconds".to_owned(),
         format!("error, {}", front.unit),
     );
-    axes(&mut svg, &x, &y, &x_name, &y_name, false);
+    axes(&mut svg, &x, &y, &x_name, &y_name);
 
     let mut line = String::new();
     for point in front.points.iter().filter(|p| p.on_front) {
@@ -259,7 +262,13 @@ fn of_growth(growth: &[Growth]) -> String {
         "Time against size",
         "both relative to the smallest that was measured; dashed: proportional",
     );
-    axes(&mut svg, &x, &y, "size, times the smallest", "time, times the least", false);
+    axes(
+        &mut svg,
+        &x,
+        &y,
+        "size, times the smallest",
+        "time, times the least",
+    );
     if all().next().is_some() {
         let end = x.high.min(y.high);
         let _ = writeln!(
@@ -277,7 +286,11 @@ fn of_growth(growth: &[Growth]) -> String {
         let mut line = String::new();
         for point in &g.points {
             let (px, py) = (x.at(point[0] / size), y.at(point[1] / seconds));
-            let _ = write!(line, "{}{px:.1} {py:.1}", if line.is_empty() { "M" } else { "L" });
+            let _ = write!(
+                line,
+                "{}{px:.1} {py:.1}",
+                if line.is_empty() { "M" } else { "L" }
+            );
             let _ = writeln!(
                 svg,
                 "<circle cx=\"{px:.1}\" cy=\"{py:.1}\" r=\"4\" fill=\"{color}\"><title>{} {}: {:.2} ms</title></circle>",
