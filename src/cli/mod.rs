@@ -5,6 +5,7 @@
 
 mod blend;
 mod bundle;
+mod estimate;
 mod evaluate;
 mod ingest;
 mod output;
@@ -13,8 +14,10 @@ mod profile;
 mod progress;
 mod realise;
 mod samples;
+mod selftest;
 mod serve;
 mod show;
+mod study;
 mod texels;
 mod weights;
 
@@ -56,7 +59,10 @@ enum Command {
     Preview(preview::Preview),
     Texels(texels::Texels),
     Evaluate(evaluate::Evaluate),
+    Estimate(estimate::Estimate),
+    Study(study::Study),
     Samples(samples::Samples),
+    Selftest(selftest::Selftest),
 }
 
 const EXAMPLES: &str = "\
@@ -108,7 +114,10 @@ fn start(cli: Cli) -> Result<(), WorkshopError> {
         Command::Preview(command) => command.run(json),
         Command::Texels(command) => command.run(json),
         Command::Evaluate(command) => command.run(json),
+        Command::Estimate(command) => command.run(json),
+        Command::Study(command) => command.run(json),
         Command::Samples(command) => command.run(json),
+        Command::Selftest(command) => command.run(json),
     }
 }
 

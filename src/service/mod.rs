@@ -8,6 +8,7 @@
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
 //! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`).
 
+mod accuracy;
 mod answer;
 mod app;
 mod blend_bundles;
@@ -15,6 +16,7 @@ mod blends;
 mod docs;
 mod documents;
 mod envelope;
+mod estimates;
 mod extract;
 mod home;
 mod ids;
@@ -30,6 +32,7 @@ mod realisations;
 mod runner;
 mod samples;
 mod serve;
+mod targets;
 mod waiting;
 mod weights;
 mod workbench;
@@ -41,8 +44,8 @@ pub use docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
-    Fault, Format, IngestOrder, Layout, Picture, PictureFormat, Progress, Scene, ThetaH, Thing,
-    View, WorkError, Works,
+    Asked, Estimate, Fault, Format, IngestOrder, Layout, Picked, Picture, PictureFormat, Progress,
+    Scene, Target, ThetaH, Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 

@@ -20,9 +20,10 @@ use super::ids;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::profile::ProfileText;
 use super::runner::{self, Ended, JobDocument, UnderWay};
+use super::targets;
 use super::waiting::Prefer;
 use super::workbench::CalledOff;
-use super::works::{Format, IngestOrder, Layout, ThetaH};
+use super::works::{Asked, Format, IngestOrder, Layout, Picked, Target, ThetaH};
 use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
 
 /// Longest silence in the middle of an upload.
@@ -61,6 +62,12 @@ pub struct IngestQuery {
     /// Clusters per slice, in place of the profile's.
     #[param(minimum = 1, maximum = 4096)]
     clusters: Option<u32>,
+    /// In place of a profile: the cheapest whose error is at most this, Lab.
+    #[param(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[param(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
 }
 
 /// Which paints to list.
@@ -159,7 +166,17 @@ pub async fn upload(
     request: Request,
 ) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
-    let order = query.and_then(|Query(query)| query.order());
+    let target = query.as_ref().map_or_else(
+        |_| Ok(Target::default()),
+        |Query(q)| {
+            targets::of_query(
+                q.max_error,
+                q.max_seconds,
+                q.profile.is_some() || q.clusters.is_some(),
+            )
+        },
+    );
+    let order = query.and_then(|Query(query)| Ok((query.order()?, target?)));
     let order = match order.and_then(|order| check_headers(&app, &parts.headers).map(|()| order)) {
         Ok(order) => order,
         Err(problem) => {
@@ -171,6 +188,21 @@ pub async fn upload(
     // Until a job names the upload it must not be swept as nobody's.
     let naming = app.removal.read().await;
     let stored = received.finish().await?;
+    let (mut order, target) = order;
+    let mut picked = None;
+    if target.is_some() {
+        match pick_for_upload(&app, stored.hash, &order, target).await {
+            Ok(found) => {
+                order.profile = *found.profile();
+                picked = Some(found);
+            }
+            Err(problem) => {
+                drop(naming);
+                app.forget_upload(stored.hash).await?;
+                return Err(problem);
+            }
+        }
+    }
     let id = ids::made_of("p_", &(stored.hash.to_string(), &order));
     let address = format!("/v1/paints/{id}");
     if app.catalogue.paint(&id).await?.is_some() {
@@ -182,6 +214,7 @@ pub async fn upload(
             Keep::Revalidated,
         )
         .location(&address)
+        .picked(picked.as_ref())
         .into_response());
     }
     let request = IngestRequest {
@@ -198,7 +231,30 @@ pub async fn upload(
         }
     };
     let made = || async { Ok(app.paint(&id).await?.document.clone()) };
-    prefer.answer(&app, &job, &address, made).await
+    let answer = prefer.answer(&app, &job, &address, made).await?;
+    Ok(targets::told(answer, picked.as_ref()))
+}
+
+async fn pick_for_upload(
+    app: &App,
+    upload: Hash,
+    order: &IngestOrder,
+    target: Target,
+) -> Result<Picked, Problem> {
+    let local = app.blobs.local(upload).await?;
+    let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
+    let (works, order) = (Arc::clone(&app.works), order.clone());
+    let picked = app.bench.run(move || {
+        let asked = Asked::Ingest {
+            upload: local.path(),
+            order: &order,
+        };
+        let folder = local.path().display().to_string();
+        works
+            .pick(&asked, &target)
+            .map_err(|error| error.without(&folder).of_upload())
+    });
+    picked.await?
 }
 
 fn check_headers(app: &App, headers: &HeaderMap) -> Result<(), Problem> {

@@ -16,8 +16,9 @@ use super::extract::{Address, Query, QueryOfTwo};
 use super::ids;
 use super::problem::{Problem, ProblemDocument};
 use super::profile::ProfileText;
+use super::targets;
 use super::weights::WeightQuery;
-use super::works::{Picture, PictureFormat, Scene, View};
+use super::works::{Asked, Picture, PictureFormat, Scene, View};
 use crate::blend::RealisationWeights;
 use crate::store::CachedResult;
 
@@ -42,6 +43,12 @@ pub struct ViewQuery {
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `draft,samples_per_pixel=100`.
     #[param(value_type = Option<String>, example = "standard")]
     profile: Option<ProfileText>,
+    /// In place of a profile: the cheapest whose mean error by sampling is at most this, CIEDE2000.
+    #[param(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[param(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
 }
 
 /// `WxH` in pixels.
@@ -153,7 +160,25 @@ async fn draw(
     query: &ViewQuery,
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
-    let view = query.view(app)?;
+    let mut view = query.view(app)?;
+    let knobs = query.profile.is_some() || query.spp.is_some();
+    let target = targets::of_query(query.max_error, query.max_seconds, knobs)?;
+    let mut picked = None;
+    if target.is_some() {
+        let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(&thing), weights.clone());
+        let found = app.bench.run(move || {
+            let asked = Asked::Preview {
+                thing: &thing.thing,
+                weights: weights.as_ref(),
+                view: &view,
+                format,
+            };
+            works.pick(&asked, &target)
+        });
+        let found = found.await?.map_err(super::works::WorkError::of_query)?;
+        view.samples_per_pixel = found.profile().samples_per_pixel;
+        picked = Some(found);
+    }
     let key = ids::key(
         "preview",
         &(&thing.id, thing.file.to_string(), &weights, view, format),
@@ -171,8 +196,11 @@ async fn draw(
     };
     let kept = app.results.get_or_compute(key, compute).await?;
     let (accuracy, picture) = split(&kept)?;
-    Ok(Answer::result(format.media_type(), picture, Keep::ForEver)
+    // What a target picks may change with the machine's load.
+    let keep = picked.as_ref().map_or(Keep::ForEver, |_| Keep::Revalidated);
+    Ok(Answer::result(format.media_type(), picture, keep)
         .header(ACCURACY, &accuracy)
+        .picked(picked.as_ref())
         .stage("preview", begun.elapsed()))
 }
 

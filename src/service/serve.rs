@@ -19,8 +19,8 @@ use super::envelope::envelope;
 use super::extract::JSON_BYTES;
 use super::works::Works;
 use super::{
-    ServiceConfig, blend_bundles, blends, docs, home, jobs, operations, paints, previews,
-    realisations, runner,
+    ServiceConfig, accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations,
+    paints, previews, realisations, runner,
 };
 use crate::store::StoreError;
 
@@ -76,6 +76,8 @@ pub fn router(app: App) -> Router {
             get(realisations::of_blend),
         )
         .route("/v1/blends/{id}/preview.{format}", get(previews::of_blend))
+        .route("/v1/estimates", axum::routing::post(estimates::create))
+        .route("/v1/accuracy", get(accuracy::show))
         .route("/v1/jobs/{id}", get(jobs::show).delete(jobs::cancel))
         .route("/v1/jobs/{id}/events", get(jobs::events))
         .route("/healthz", get(operations::healthz))
