@@ -95,6 +95,7 @@ impl Preview {
             size: [self.size.width, self.size.height],
             samples_per_pixel: self.spp.unwrap_or(options.profile.samples_per_pixel),
             environment,
+            lights: None,
         };
         let progress = Progress::new("drawing");
         let made = preview(

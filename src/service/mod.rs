@@ -16,6 +16,7 @@ mod documents;
 mod envelope;
 mod extract;
 mod home;
+mod idempotency;
 mod ids;
 mod jobs;
 mod metrics;
@@ -29,7 +30,9 @@ mod realisations;
 mod runner;
 mod samples;
 mod serve;
+mod visibility;
 mod waiting;
+mod watchers;
 mod weights;
 mod workbench;
 mod works;
@@ -40,8 +43,8 @@ pub use docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
-    Fault, Format, IngestOrder, Layout, Picture, PictureFormat, Progress, Scene, ThetaH, Thing,
-    View, WorkError, Works,
+    Fault, Format, IngestOrder, Layout, Light, Picture, PictureFormat, Progress, Scene, ThetaH,
+    Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 
@@ -69,6 +72,8 @@ pub struct ServiceConfig {
     pub most_connections: usize,
     /// Longest time for the header of a request.
     pub header_time: Duration,
+    /// Longest time for a JSON body.
+    pub body_time: Duration,
     /// Longest time for requests under way when the service goes down.
     pub grace: Duration,
 }
@@ -86,6 +91,7 @@ impl ServiceConfig {
             most_jobs: 256,
             most_connections: 1024,
             header_time: Duration::from_secs(10),
+            body_time: Duration::from_secs(10),
             grace: Duration::from_secs(5),
         }
     }

@@ -1,9 +1,9 @@
 //! Paints: uploads become paints, which can be listed, read, taken back and deleted.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use axum::body::Body;
+use axum::body::{Body, BodyDataStream};
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -16,10 +16,12 @@ use super::answer::{Answer, Keep};
 use super::app::App;
 use super::documents::{PaintDocument, PaintList, PaintSummary};
 use super::extract::{Address, NoQuery, Query};
+use super::idempotency::Idempotency;
 use super::ids;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::profile::ProfileText;
 use super::runner::{self, Ended, JobDocument, UnderWay};
+use super::visibility::Visibility;
 use super::waiting::Prefer;
 use super::workbench::CalledOff;
 use super::works::{Format, IngestOrder, Layout, ThetaH};
@@ -27,6 +29,9 @@ use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
 
 /// Longest silence in the middle of an upload.
 const SILENCE: Duration = Duration::from_secs(30);
+
+/// Least bytes a second of an upload, but for so much time as one silence.
+const LEAST_RATE: u64 = 16 << 10;
 
 /// Longest time that a refused upload is still taken in, and most bytes of it.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -69,6 +74,8 @@ pub struct IngestQuery {
 pub struct ListQuery {
     /// Words that name or source contain, whatever the case.
     q: Option<String>,
+    /// `private` lists paints that are not published, in place of those that are.
+    visibility: Option<Visibility>,
     /// `next` of the page before.
     cursor: Option<String>,
     /// Most paints on the page, 50 unless given.
@@ -141,7 +148,8 @@ impl IngestQuery {
 /// answered with the job that goes on.
 #[utoipa::path(
     post, operation_id = "upload_paint", path = "/v1/paints", tag = "paints", params(IngestQuery,
-        ("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`")),
+        ("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`"),
+        ("Idempotency-Key" = Option<String>, Header, description = "Refuses this key with another request")),
     request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "The measurement"),
     responses(
         (status = 200, description = "The paint, made of the same upload before", body = PaintDocument),
@@ -156,49 +164,62 @@ pub async fn upload(
     State(app): State<App>,
     query: Result<Query<IngestQuery>, Problem>,
     prefer: Prefer,
+    idempotency: Result<Idempotency, Problem>,
     request: Request,
 ) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
     let order = query.and_then(|Query(query)| query.order());
-    let order = match order.and_then(|order| check_headers(&app, &parts.headers).map(|()| order)) {
-        Ok(order) => order,
+    let order = order.and_then(|order| check_headers(&app, &parts.headers).map(|()| order));
+    let (order, idempotency) = match order.and_then(|order| Ok((order, idempotency?))) {
+        Ok(asked) => asked,
         Err(problem) => {
-            let _ = tokio::time::timeout(PATIENCE, drain(body)).await;
+            drain(body.into_data_stream()).await;
             return Err(problem);
         }
     };
     let received = receive(&app, body).await?;
+    let (id, job) = runner::to_its_end(accept(app.clone(), received, order, idempotency)).await?;
+    let address = format!("/v1/paints/{id}");
+    let Some(job) = job else {
+        let known = app.paint(&id).await?.document.clone();
+        let answer = Answer::result("application/json", known, Keep::Revalidated);
+        return Ok(answer.location(&address).into_response());
+    };
+    let made = || async { Ok(app.paint(&id).await?.document.clone()) };
+    prefer.answer(&app, &job, &address, made).await
+}
+
+/// Keeps what was received and has a job make a paint of it, unless there is one: the id of the paint, and the job.
+async fn accept(
+    app: App,
+    received: Box<dyn BlobWriter>,
+    order: IngestOrder,
+    idempotency: Idempotency,
+) -> Result<(String, Option<String>), Problem> {
     // Until a job names the upload it must not be swept as nobody's.
     let naming = app.removal.read().await;
     let stored = received.finish().await?;
     let id = ids::made_of("p_", &(stored.hash.to_string(), &order));
-    let address = format!("/v1/paints/{id}");
     if app.catalogue.paint(&id).await?.is_some() {
-        drop(naming);
-        let known = app.paint(&id).await?;
-        return Ok(Answer::result(
-            "application/json",
-            known.document.clone(),
-            Keep::Revalidated,
-        )
-        .location(&address)
-        .into_response());
+        idempotency.claim(&app, &id).await?;
+        return Ok((id, None));
     }
     let request = IngestRequest {
         upload: Hash64(stored.hash.to_string()),
         order,
     };
-    let job = runner::submit(&app, JobKind::Ingest, &id, &request).await;
+    let job = match idempotency.claim(&app, &id).await {
+        Ok(()) => runner::submit(&app, JobKind::Ingest, &id, &request).await,
+        Err(problem) => Err(problem),
+    };
     drop(naming);
-    let job = match job {
-        Ok(job) => job,
+    match job {
+        Ok(job) => Ok((id, Some(job))),
         Err(problem) => {
             app.forget_upload(stored.hash).await?;
-            return Err(problem);
+            Err(problem)
         }
-    };
-    let made = || async { Ok(app.paint(&id).await?.document.clone()) };
-    prefer.answer(&app, &job, &address, made).await
+    }
 }
 
 fn check_headers(app: &App, headers: &HeaderMap) -> Result<(), Problem> {
@@ -235,23 +256,25 @@ fn too_large(app: &App) -> Problem {
         .accepting(format!("up to {} bytes", app.config.limits.bytes))
 }
 
-/// Takes in what is refused: who still sends does not listen.
-async fn drain(body: Body) {
-    let mut pieces = body.into_data_stream();
-    let mut length = 0;
-    while let Some(Ok(piece)) = pieces.next().await {
-        length += piece.len();
-        if length > MOST_DRAINED {
-            return;
+/// Takes in what is refused, within reason: who still sends does not listen.
+async fn drain(mut pieces: BodyDataStream) {
+    let drained = async {
+        let mut length = 0;
+        while let Some(Ok(piece)) = pieces.next().await {
+            length += piece.len();
+            if length > MOST_DRAINED {
+                return;
+            }
         }
-    }
+    };
+    let _ = tokio::time::timeout(PATIENCE, drained).await;
 }
 
 /// Streams a body into a blob that is still to be finished.
 async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Problem> {
     let mut writer = app.blobs.begin().await?;
     let mut pieces = body.into_data_stream();
-    let mut length = 0;
+    let (mut length, begun) = (0, Instant::now());
     loop {
         let piece = match tokio::time::timeout(SILENCE, pieces.next()).await {
             Ok(None) => break,
@@ -272,7 +295,21 @@ async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Problem> 
         };
         length += piece.len() as u64;
         if length > app.config.limits.bytes {
+            drop(writer);
+            drain(pieces).await;
             return Err(too_large(app));
+        }
+        if begun.elapsed() > SILENCE + Duration::from_secs(length / LEAST_RATE) {
+            let detail = format!(
+                "{length} bytes came in {} seconds.",
+                begun.elapsed().as_secs()
+            );
+            return Err(
+                Problem::new(Kind::RequestTimeout, detail).accepting(format!(
+                    "at least {LEAST_RATE} bytes a second after the first {} seconds",
+                    SILENCE.as_secs()
+                )),
+            );
         }
         writer.append(piece).await?;
     }
@@ -342,7 +379,12 @@ pub async fn list(
     }
     let page = app
         .catalogue
-        .paints(query.q.as_deref(), cursor, limit)
+        .paints(
+            query.q.as_deref(),
+            query.visibility.unwrap_or_default().into(),
+            cursor,
+            limit,
+        )
         .await?;
     let list = PaintList {
         paints: page.paints.into_iter().map(summary).collect(),
@@ -367,6 +409,7 @@ fn summary(record: PaintRecord) -> PaintSummary {
         id: record.id,
         name: record.name,
         source: record.source,
+        visibility: record.visibility.into(),
         hash: record.content.to_string(),
     }
 }
@@ -412,7 +455,10 @@ pub async fn file(
     let paint = app.paint(&id).await?;
     let missing = || Problem::internal(format!("the file of {id} is not there"));
     let blob = app.blobs.stream(paint.file).await?.ok_or_else(missing)?;
-    Ok(Answer::blob(Format::Paint.media_type(), paint.file, blob).saved_as(&format!("{id}.paint")))
+    Ok(
+        Answer::blob(Format::Paint.media_type(), paint.file, blob, Keep::ForEver)
+            .saved_as(&format!("{id}.paint")),
+    )
 }
 
 /// The measurement a paint was made of: the very bytes that were uploaded.
@@ -439,8 +485,10 @@ pub async fn measurement(
     let upload = paint.measurement.ok_or_else(none)?;
     let missing = || Problem::internal(format!("the measurement of {id} is not there"));
     let blob = app.blobs.stream(upload).await?.ok_or_else(missing)?;
-    Ok(Answer::blob("application/octet-stream", upload, blob)
-        .saved_as(&format!("{id}.measurement")))
+    Ok(
+        Answer::blob("application/octet-stream", upload, blob, Keep::Own)
+            .saved_as(&format!("{id}.measurement")),
+    )
 }
 
 /// Delete a paint with its measurement. Blends that were made of it stay.
@@ -466,6 +514,7 @@ pub(super) fn links(record: &PaintRecord) -> Value {
     let base = format!("/v1/paints/{}", record.id);
     let measurement = record.measurement.map(|_| format!("{base}/measurement"));
     json!({
+        "visibility": Visibility::from(record.visibility),
         "links": {
             "self": base,
             "paint": format!("{base}/paint"),

@@ -5,14 +5,14 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Fault, Format, IngestOrder, Layout, Picture, PictureFormat, Progress, Scene, ThetaH, Thing,
-    View, WorkError, Works,
+    Fault, Format, IngestOrder, Layout, Light, Picture, PictureFormat, Progress, Scene, ThetaH,
+    Thing, View, WorkError, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::measurement::{self, ReadOptions, ThetaHSpacing};
 use crate::paint::{Limits, PaintFile};
-use crate::workshop::{self, IngestOptions, PreviewOptions, WorkshopError};
+use crate::workshop::{self, IngestOptions, PreviewLight, PreviewOptions, WorkshopError};
 
 /// Does the work, within limits.
 #[derive(Clone, Copy, Debug)]
@@ -106,6 +106,7 @@ impl Works for Workshop {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
+        progress: Progress<'_>,
     ) -> Result<Picture, WorkError> {
         let scene = match view.scene {
             Scene::Sphere => "sphere",
@@ -117,12 +118,19 @@ impl Works for Workshop {
             size: view.size,
             samples_per_pixel: view.samples_per_pixel,
             environment: None,
+            lights: view.lights.as_ref().map(|lights| {
+                let light = |light: &Light| PreviewLight {
+                    towards: light.towards,
+                    irradiance: light.irradiance,
+                };
+                lights.iter().map(light).collect()
+            }),
         };
         let format = match format {
             PictureFormat::Png => workshop::PictureFormat::Png,
             PictureFormat::Exr => workshop::PictureFormat::Exr,
         };
-        let made = workshop::preview(thing, weights, &options, format, &self.limits, &|_| ())?;
+        let made = workshop::preview(thing, weights, &options, format, &self.limits, progress)?;
         let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
         let mut accuracy = Vec::new();
         for (name, path) in [
@@ -135,6 +143,7 @@ impl Works for Workshop {
         Ok(Picture {
             bytes: made.bytes,
             accuracy: accuracy.join(", "),
+            report: made.report,
         })
     }
 

@@ -102,9 +102,13 @@ pub fn open_measurement(
         ..options.limits
     };
     let bytes = read(path, &held)?;
+    // What is not recognised can be named.
+    let layout = sniff(&bytes, &options.read).map_err(|e| WorkshopError {
+        field: Some("layout".to_owned()),
+        ..wrong(&e)
+    })?;
     let brdf =
         BrdfMeasurement::read(&bytes, &options.read, &options.limits).map_err(|e| wrong(&e))?;
-    let layout = sniff(&bytes, &options.read).map_err(|e| wrong(&e))?;
     let hash = blake3::hash(&bytes);
     Ok(Measurement::Brdf(Box::new(BareMeasurement {
         brdf,

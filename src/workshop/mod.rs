@@ -17,7 +17,7 @@ mod thing;
 
 pub use blending::{Blended, blend_paints};
 pub use describing::{describe_blend, describe_paint};
-pub use error::{Fault, WorkshopError};
+pub use error::{Fault, WorkshopError, accepted};
 pub use estimate::{
     Estimate, EstimatedError, Stage, estimate_blend, estimate_blend_of, estimate_ingest,
     estimate_preview, estimate_realise,
@@ -27,7 +27,9 @@ pub use ingest::{
     BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, ingest, ingest_upload,
     open_measurement,
 };
-pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};
+pub use previewing::{
+    PictureFormat, PreviewLight, PreviewOptions, preview, read_environment, texels,
+};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
 pub use thing::{Source, Thing, find, open, open_paint, read};

@@ -130,11 +130,19 @@ impl Works for Pretend {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
+        progress: Progress<'_>,
     ) -> Result<Picture, WorkError> {
         let paint = self.realise(thing, weights, Format::Json, &Profile::default())?;
+        // A tall picture takes its time.
+        let begun = Instant::now();
+        while view.size[1] == 4000 && begun.elapsed() < Duration::from_secs(4) {
+            progress(0.5);
+            std::thread::sleep(Duration::from_millis(5));
+        }
         Ok(Picture {
             bytes: [format!("{format:?} {view:?} ").into_bytes(), paint].concat(),
             accuracy: "sampling-mean-de2000=0.5".to_owned(),
+            report: json!({ "clamps": [], "plan": "whatever" }),
         })
     }
 

@@ -12,7 +12,8 @@ use super::answer::{Answer, Keep};
 use super::extract::Address;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::{
-    blends, documents, jobs, operations, paints, previews, profile, realisations, runner, works,
+    blends, documents, jobs, operations, paints, previews, profile, realisations, runner,
+    visibility, works,
 };
 
 /// Only what this service itself serves.
@@ -28,17 +29,17 @@ const POLICY: &str =
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     paths(
-        paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete,
+        paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete, visibility::change,
         blends::create, blends::show,
         realisations::of_blend, realisations::of_paint,
-        previews::of_blend, previews::of_paint,
+        previews::of_blend, previews::of_paint, previews::create,
         jobs::show, jobs::events, jobs::cancel,
         operations::healthz, operations::readyz, operations::metrics,
     ),
     components(schemas(
         documents::PaintDocument, documents::PaintList, documents::PaintSummary, documents::BlendDocument,
         blends::BlendOrder, profile::ProfileDocument, profile::KnobsDocument, runner::JobDocument, operations::Health, ProblemDocument,
-        works::Layout, works::ThetaH, works::Format, works::PictureFormat, works::Scene,
+        works::Layout, works::ThetaH, works::Format, previews::PreviewFormat, previews::PreviewOrder, works::Light, works::Scene,
     )),
     tags(
         (name = "paints", description = "Uploads become paints"),
@@ -86,6 +87,7 @@ fn methods(item: &PathItem) -> String {
     let known = [
         (&item.get, "GET, HEAD"),
         (&item.post, "POST"),
+        (&item.patch, "PATCH"),
         (&item.delete, "DELETE"),
     ];
     known
