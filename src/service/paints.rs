@@ -26,6 +26,7 @@ use super::waiting::Prefer;
 use super::workbench::CalledOff;
 use super::works::{Format, IngestOrder, Layout, ThetaH};
 use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
+use crate::workshop::NAME_CHARACTERS;
 
 /// Longest silence in the middle of an upload.
 const SILENCE: Duration = Duration::from_secs(30);
@@ -36,9 +37,6 @@ const LEAST_RATE: u64 = 16 << 10;
 /// Longest time that a refused upload is still taken in, and most bytes of it.
 const PATIENCE: Duration = Duration::from_secs(5);
 const MOST_DRAINED: usize = 64 << 20;
-
-/// Longest name of a paint, characters.
-const LONGEST_NAME: usize = 200;
 
 /// Longest page of a list.
 const LONGEST_PAGE: u32 = 200;
@@ -103,7 +101,7 @@ impl Hash64 {
 impl IngestQuery {
     fn order(self) -> Result<IngestOrder, Problem> {
         if let Some(name) = &self.name
-            && (!(1..=LONGEST_NAME).contains(&name.chars().count())
+            && (!NAME_CHARACTERS.contains(&name.chars().count())
                 || name.chars().any(char::is_control))
         {
             return Err(Problem::parameter(

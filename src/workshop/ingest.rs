@@ -17,7 +17,7 @@ use crate::paint::{
 };
 
 /// Characters a paint's name may have.
-pub const NAME_CHARACTERS: std::ops::RangeInclusive<usize> = 1..=200;
+pub const NAME_CHARACTERS: std::ops::RangeInclusive<usize> = 1..=crate::paint::NAME_CHARACTERS;
 
 /// How a measurement is ingested.
 #[derive(Clone, Debug, Default)]

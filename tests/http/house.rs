@@ -10,7 +10,7 @@ use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
     App, Fault, Format, IngestOrder, Picture, PictureFormat, Progress, ServiceConfig, Thing, View,
-    WorkError, Works, open, serve,
+    WorkError, Works, Workshop, open, serve,
 };
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
@@ -170,8 +170,19 @@ impl House {
         Self::with(ServiceConfig::new(data.to_owned())).await
     }
 
+    /// With the real workshop behind it.
+    pub async fn real(data: &Path) -> Self {
+        let config = ServiceConfig::new(data.to_owned());
+        let works = Arc::new(Workshop::new(config.limits));
+        Self::of(config, works).await
+    }
+
     pub async fn with(config: ServiceConfig) -> Self {
-        let app: App = open(config, Arc::new(Pretend)).await.expect("opens");
+        Self::of(config, Arc::new(Pretend)).await
+    }
+
+    async fn of(config: ServiceConfig, works: Arc<dyn Works>) -> Self {
+        let app: App = open(config, works).await.expect("opens");
         app.set_ready();
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("an address");

@@ -3,6 +3,7 @@
 mod client;
 mod house;
 mod kill;
+mod real;
 
 use std::time::{Duration, Instant};
 
