@@ -11,6 +11,7 @@ mod geometries;
 mod knobs;
 mod profile;
 mod sparkle;
+pub mod study;
 mod writing;
 
 pub use clustering::{clustering_error, predicted_clustering_error};

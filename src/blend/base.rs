@@ -34,21 +34,34 @@ pub(super) fn common_grid<'a>(
     }
 }
 
-/// Coats blend linearly; an uncoated paint is a coat of index 1, as rough as its partners' mean, and one whose thickness
-/// nobody stated is as thick as theirs. Paints of weight 0 have no say in whether there is a coat or a thickness at all.
-pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> Option<Coat> {
-    let coats: Vec<Coat> = paints.iter().filter_map(|p| p.coat).collect();
+/// A coat for every paint: an uncoated one is a coat of index 1, as rough as its partners' mean, and one whose thickness
+/// nobody stated is as thick as theirs. `None` where no paint is coated.
+pub(super) fn coats(paints: &[BlendedPaint]) -> Option<Vec<Coat>> {
+    let known: Vec<Coat> = paints.iter().filter_map(|p| p.coat).collect();
     let stand_in = Coat {
         ior: 1.0,
-        roughness: mean(coats.iter().map(|c| c.roughness))?,
+        roughness: mean(known.iter().map(|c| c.roughness))?,
         thickness_um: None,
     };
-    let thickness = mean(coats.iter().filter_map(|c| c.thickness_um));
-    let mix = |get: &dyn Fn(Coat) -> f64| {
-        paints
+    let thickness = mean(known.iter().filter_map(|c| c.thickness_um));
+    let of = |paint: &BlendedPaint| {
+        let coat = paint.coat.unwrap_or(stand_in);
+        Coat {
+            thickness_um: coat.thickness_um.or(thickness),
+            ..coat
+        }
+    };
+    Some(paints.iter().map(of).collect())
+}
+
+/// Coats blend linearly. Paints of weight 0 have no say in whether there is a coat or a thickness at all.
+pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> Option<Coat> {
+    let coats = coats(paints)?;
+    let mix = |get: &dyn Fn(&Coat) -> f64| {
+        coats
             .iter()
             .zip(weights)
-            .map(|(p, w)| w * get(p.coat.unwrap_or(stand_in)))
+            .map(|(c, w)| w * get(c))
             .sum::<f64>()
     };
     let taking_part = || {
@@ -64,8 +77,8 @@ pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger
     Some(Coat {
         ior,
         roughness: ledger.hold("coat.roughness", mix(&|c| c.roughness), 0.0, 1.0),
-        thickness_um: thickness.filter(|_| stated).map(|thickness| {
-            let mixed = mix(&|c| c.thickness_um.unwrap_or(thickness));
+        thickness_um: stated.then(|| {
+            let mixed = mix(&|c| c.thickness_um.unwrap_or_default());
             ledger.hold("coat.thickness_um", mixed, 0.0, 1e6)
         }),
     })

@@ -20,6 +20,7 @@ mod mixture;
 mod order;
 mod origin;
 mod pairs;
+mod parts;
 mod realise;
 mod thinned;
 mod weights;
@@ -30,6 +31,7 @@ pub use file::BlendFileError;
 pub use order::Order;
 pub use origin::{Origin, Reduction};
 pub use pairs::PairReport;
+pub(crate) use parts::Part;
 pub use realise::Realised;
 pub use weights::{RealisationWeights, WeightError};
 

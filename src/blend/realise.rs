@@ -49,13 +49,7 @@ impl Blend {
         let lightness = by_hash(wanted.flake_lightness());
         let color = by_hash(wanted.flake_color());
         let mut ledger = Ledger::default();
-        let places = lobes::matched(
-            &self
-                .paints
-                .iter()
-                .map(|p| p.lobes.as_slice())
-                .collect::<Vec<_>>(),
-        );
+        let places = self.matched_lobes();
         let paint = CarPaint {
             coat: base::coat(&self.paints, &base_weights, &mut ledger),
             diffuse: base::diffuse(&self.paints, &base_weights, &mut ledger),

@@ -12,7 +12,7 @@ use super::profile::ProfileArgs;
 use super::progress::Progress;
 use crate::accuracy::blend_error;
 use crate::blend::PAINTS;
-use crate::workshop::{WorkshopError, blend_paints, describe_blend, open_paint};
+use crate::workshop::{Work, WorkshopError, blend_paints, describe_blend, open_paint};
 
 /// Find how the flakes of 2 to 5 paints become one another, and keep it as a .blend.
 ///
@@ -34,7 +34,7 @@ pub struct Blend {
 
 impl Blend {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        let options = ReadingArgs::default().options(None, &self.profile)?;
+        let mut options = ReadingArgs::default().options(None, &self.profile)?;
         if !PAINTS.contains(&self.inputs.len()) {
             let problem = format!(
                 "{} paints given, a blend takes {} to {}",
@@ -43,6 +43,13 @@ impl Blend {
                 PAINTS.end()
             );
             return Err(WorkshopError::usage("INPUT", problem));
+        }
+        let picked = self.profile.pick(&Work::BlendNames {
+            names: &self.inputs,
+            options: &options,
+        })?;
+        if let Some(picked) = &picked {
+            options.profile = *picked.profile();
         }
         let start = Instant::now();
         let mut paints = Vec::with_capacity(self.inputs.len());
@@ -75,8 +82,12 @@ impl Blend {
             let correspondence = &describe_blend(&made.blend)["correspondence"];
             return output::print_json(
                 &json!({ "out": self.out, "paints": names, "profile": options.profile.name(),
-                    "correspondence": correspondence, "error": blend_error(&made.blend), "notes": made.notes }),
+                    "correspondence": correspondence, "error": blend_error(&made.blend), "picked": picked,
+                    "notes": made.notes }),
             );
+        }
+        if let Some(picked) = &picked {
+            eprintln!("target {}", picked.line());
         }
         for note in &made.notes {
             eprintln!("note: {note}");

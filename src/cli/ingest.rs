@@ -9,7 +9,7 @@ use super::profile::ProfileArgs;
 use super::progress::Progress;
 use super::{output, show};
 use crate::measurement::{Layout, ReadOptions, ThetaHSpacing};
-use crate::workshop::{IngestOptions, Source, WorkshopError, find, ingest};
+use crate::workshop::{IngestOptions, Source, Work, WorkshopError, find, ingest};
 
 /// Fit a measurement and keep it as a .paint.
 ///
@@ -104,8 +104,7 @@ impl ReadingArgs {
 
 impl Ingest {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        let options = self.reading.options(self.name.clone(), &self.profile)?;
-        let progress = Progress::new("ingesting");
+        let mut options = self.reading.options(self.name.clone(), &self.profile)?;
         let path = match find(&self.input)? {
             Source::Path(path) => path,
             Source::Sample(sample) => {
@@ -116,11 +115,25 @@ impl Ingest {
                 return Err(WorkshopError::input(&self.input, hint));
             }
         };
+        let work = Work::Ingest {
+            path: &path,
+            options: &options,
+        };
+        let picked = self.profile.pick(&work)?;
+        if let Some(picked) = &picked {
+            options.profile = *picked.profile();
+        }
+        let progress = Progress::new("ingesting");
         let paint = ingest(&path, &options, &|share| progress.at(share))?;
         output::replace(&self.out, &paint.to_bytes())?;
         drop(progress);
         if json {
-            return output::print_json(&json!({ "out": self.out, "paint": show::summary(&paint) }));
+            return output::print_json(
+                &json!({ "out": self.out, "profile": options.profile.name(), "picked": picked, "paint": show::summary(&paint) }),
+            );
+        }
+        if let Some(picked) = &picked {
+            eprintln!("target {}", picked.line());
         }
         for warning in &paint.warnings {
             eprintln!("warning: {warning}");

@@ -4,6 +4,8 @@
 //! a bug; `--json` prints one object on stdout; progress and errors go to stderr; files appear whole or not at all.
 
 mod blend;
+mod bundle;
+mod estimate;
 mod evaluate;
 mod ingest;
 mod output;
@@ -12,8 +14,10 @@ mod profile;
 mod progress;
 mod realise;
 mod samples;
+mod selftest;
 mod serve;
 mod show;
+mod study;
 mod texels;
 mod weights;
 
@@ -51,10 +55,14 @@ enum Command {
     Show(show::Show),
     Blend(blend::Blend),
     Realise(realise::Realise),
+    Bundle(bundle::Bundle),
     Preview(preview::Preview),
     Texels(texels::Texels),
     Evaluate(evaluate::Evaluate),
+    Estimate(estimate::Estimate),
+    Study(study::Study),
     Samples(samples::Samples),
+    Selftest(selftest::Selftest),
 }
 
 const EXAMPLES: &str = "\
@@ -62,6 +70,7 @@ Examples:
   carpaint blend sample:polaris_silber sample:ford_f8 --out two.blend
   carpaint preview two.blend --weights 0.5,0.5 --out between.png
   carpaint realise two.blend --weights 0.5,0.5 --out between.zip
+  carpaint bundle two.blend --out sliders.zip
   carpaint serve";
 
 /// Runs the command line of this process.
@@ -101,10 +110,14 @@ fn start(cli: Cli) -> Result<(), WorkshopError> {
         Command::Show(command) => command.run(json),
         Command::Blend(command) => command.run(json),
         Command::Realise(command) => command.run(json),
+        Command::Bundle(command) => command.run(json),
         Command::Preview(command) => command.run(json),
         Command::Texels(command) => command.run(json),
         Command::Evaluate(command) => command.run(json),
+        Command::Estimate(command) => command.run(json),
+        Command::Study(command) => command.run(json),
         Command::Samples(command) => command.run(json),
+        Command::Selftest(command) => command.run(json),
     }
 }
 

@@ -13,7 +13,7 @@ use super::profile::ProfileArgs;
 use super::progress::Progress;
 use super::weights::WeightArgs;
 use crate::workshop::{
-    PictureFormat, PreviewOptions, WorkshopError, open, preview, read_environment,
+    PictureFormat, PreviewOptions, Work, WorkshopError, open, preview, read_environment,
 };
 
 /// Draw a paint, a blend at given weights, or a sample.
@@ -31,7 +31,7 @@ pub struct Preview {
     #[arg(long, value_name = "WxH", default_value = "512x512")]
     size: Size,
     /// Samples per pixel, in place of the profile's.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", conflicts_with_all = ["max_error", "max_seconds"])]
     spp: Option<u32>,
     /// A panorama to light it with, .hdr or .exr, in place of the built-in studio.
     #[arg(long, value_name = "FILE")]
@@ -89,14 +89,25 @@ impl Preview {
             .as_deref()
             .map(|path| read_environment(path, &options.limits))
             .transpose()?;
-        let opened = start.elapsed();
-        let wanted = PreviewOptions {
+        let mut wanted = PreviewOptions {
             scene: self.scene.clone(),
             size: [self.size.width, self.size.height],
             samples_per_pixel: self.spp.unwrap_or(options.profile.samples_per_pixel),
             environment,
             lights: None,
         };
+        let picked = self.profile.pick(&Work::Preview {
+            thing: &thing,
+            weights: weights.as_ref(),
+            options: &wanted,
+            format,
+            limits: &options.limits,
+            written: true,
+        })?;
+        if let Some(picked) = &picked {
+            wanted.samples_per_pixel = picked.profile().samples_per_pixel;
+        }
+        let opened = start.elapsed();
         let progress = Progress::new("drawing");
         let made = preview(
             &thing,
@@ -121,8 +132,11 @@ impl Preview {
         }
         if json {
             return output::print_json(
-                &json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report }),
+                &json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report, "picked": picked }),
             );
+        }
+        if let Some(picked) = &picked {
+            eprintln!("target {}", picked.line());
         }
         for line in &made.notes {
             eprintln!("note: {line}");

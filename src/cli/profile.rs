@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::accuracy::{Knobs, Profile, ProfileError};
 use crate::paint::Limits;
-use crate::workshop::{WorkshopError, read};
+use crate::workshop::{Picked, Target, Work, WorkshopError, read};
 
 /// The profile, by name, by file and by knobs; later ones win.
 #[derive(Args, Clone, Debug, Default)]
@@ -21,6 +21,12 @@ pub struct ProfileArgs {
     /// Clusters per flake slice, 1 to 4096, in place of the profile's.
     #[arg(long, value_name = "N")]
     pub clusters: Option<u32>,
+    /// In place of a profile: the cheapest whose error is at most this, Lab for flakes, CIEDE2000 for pictures.
+    #[arg(long, value_name = "E", conflicts_with_all = ["profile", "knobs", "clusters"])]
+    pub max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds on this machine.
+    #[arg(long, value_name = "S", conflicts_with_all = ["profile", "knobs", "clusters"])]
+    pub max_seconds: Option<f64>,
 }
 
 impl ProfileArgs {
@@ -54,6 +60,25 @@ impl ProfileArgs {
             };
             WorkshopError::usage(option, e)
         })
+    }
+
+    /// The profile that meets the target, where one was given.
+    pub fn pick(&self, work: &Work<'_>) -> Result<Option<Picked>, WorkshopError> {
+        let target = Target {
+            max_error: self.max_error,
+            max_seconds: self.max_seconds,
+        };
+        let wrong = |e: WorkshopError| match e.field.as_deref() {
+            Some(field @ ("max_error" | "max_seconds")) => {
+                let option = format!("--{}", field.replace('_', "-"));
+                WorkshopError::usage(&option, e.message.replace(field, &option))
+            }
+            _ => e,
+        };
+        if !target.is_some() {
+            return Ok(None);
+        }
+        target.pick(work).map(Some).map_err(wrong)
     }
 
     /// Clusters asked for by number.

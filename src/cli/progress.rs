@@ -29,6 +29,11 @@ impl Progress {
         Self::new(&format!("reading {input}"))
     }
 
+    /// Says what is being done now.
+    pub fn says(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
+    }
+
     /// Moves the bar to a share of 0 to 1.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a bar of a thousand steps
     pub fn at(&self, share: f32) {

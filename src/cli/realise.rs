@@ -1,6 +1,7 @@
 //! `carpaint realise`: a blend at given weights becomes a file that others use.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use clap::Args;
 use serde_json::json;
@@ -10,7 +11,7 @@ use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
 use super::weights::WeightArgs;
-use crate::workshop::{Format, WorkshopError, open, realise};
+use crate::workshop::{Format, Work, WorkshopError, open, realise};
 
 /// Take a realisation of a blend: a texture bundle, a GLB, a material.json, or a .paint.
 ///
@@ -27,22 +28,50 @@ pub struct Realise {
     /// File to write; its ending says what: .zip, .glb, .json or .paint.
     #[arg(long, value_name = "F.zip|F.glb|F.json|F.paint")]
     out: PathBuf,
+    /// Write the seconds each stage took.
+    #[arg(long, value_name = "T.json")]
+    timings: Option<PathBuf>,
 }
 
 impl Realise {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        let options = ReadingArgs::default().options(None, &self.profile)?;
+        let start = Instant::now();
+        let mut options = ReadingArgs::default().options(None, &self.profile)?;
         let format = Format::of_path(&self.out)?;
         let progress = Progress::reading(&self.input);
         let thing = open(&self.input, &options, &|share| progress.at(share))?;
         drop(progress);
         let weights = self.weights.for_thing(&thing)?;
+        let picked = self.profile.pick(&Work::Realise {
+            thing: &thing,
+            weights: weights.as_ref(),
+            format,
+            written: true,
+        })?;
+        if let Some(picked) = &picked {
+            options.profile = *picked.profile();
+        }
+        let opened = start.elapsed();
         let made = realise(&thing, weights.as_ref(), format, &options.profile)?;
+        let realised = start.elapsed();
         output::replace(&self.out, &made.bytes)?;
+        if let Some(timings) = &self.timings {
+            let written = start.elapsed();
+            let seconds = json!({
+                "open": opened.as_secs_f64(),
+                "realise": realised.saturating_sub(opened).as_secs_f64(),
+                "write": written.saturating_sub(realised).as_secs_f64(),
+                "total": written.as_secs_f64(),
+            });
+            output::replace(timings, seconds.to_string().as_bytes())?;
+        }
         if json {
             return output::print_json(
-                &json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report }),
+                &json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report, "picked": picked }),
             );
+        }
+        if let Some(picked) = &picked {
+            eprintln!("target {}", picked.line());
         }
         for line in &made.notes {
             eprintln!("note: {line}");

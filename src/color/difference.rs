@@ -79,6 +79,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn it_does_not_matter_which_color_comes_first(
             x in prop::array::uniform3(-100.0..150.0_f64), y in prop::array::uniform3(-100.0..150.0_f64),

@@ -109,6 +109,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn the_stated_losses_are_those_of_the_steps(
             weights in prop::collection::vec((1e-6..1.0_f64, 0.0..3.0_f64), 1..120),

@@ -19,9 +19,9 @@ use crate::color::{LinearRgb, luminance};
 use crate::paint::{CarPaint, Flakes, RandomTexture, cumulative, mean_color};
 
 /// Largest number of clusters: their numbers are exact in a 32-bit float.
-const MAX_CLUSTERS: usize = 1 << 24;
+pub(super) const MAX_CLUSTERS: usize = 1 << 24;
 /// Rows of a texture that every WebGL2 reaches in practice.
-const MAX_ROWS: usize = 4096;
+pub(super) const MAX_ROWS: usize = 4096;
 
 /// A texture on its way out.
 #[derive(Clone, Debug)]
@@ -89,7 +89,7 @@ impl Textures {
     }
 
     /// A table of linear colors. Eight bits of linear light band: such tables stay halves.
-    fn colors(
+    pub(super) fn colors(
         &mut self,
         name: &'static str,
         width: usize,
@@ -194,7 +194,7 @@ impl Textures {
         Ok(())
     }
 
-    fn angles(&mut self, paint: &CarPaint) {
+    pub(super) fn angles(&mut self, paint: &CarPaint) {
         let table = &paint.color_table;
         let mut rows = vec![table.theta_h().degrees(), table.theta_d().degrees()];
         if let Some(flakes) = &paint.flakes {
@@ -232,21 +232,32 @@ impl Textures {
             about,
         )?;
         self.slices(flakes)?;
-        self.corners(flakes, width, settings.precision)?;
-        let mut cumulative = cumulative(flakes);
-        cumulative.resize(clusters.div_ceil(width) * width, 1.0);
-        let about = "cumulative probability of every cluster within its slice";
-        self.floats("cumulative", width, &[("R", &cumulative)], about)?;
-        if settings.alias {
-            self.alias(flakes, width)?;
-        }
+        self.corners(&flakes.lower, &flakes.upper, width, settings.precision)?;
+        self.probability(flakes, width, settings.alias)?;
         if settings.inverse_cdf {
             self.inverse_cdf(flakes, &luminances)?;
         }
         self.random(flakes)
     }
 
-    fn slices(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
+    /// How clusters are drawn: cumulative probability, and the alias table where it is wanted.
+    pub(super) fn probability(
+        &mut self,
+        flakes: &Flakes,
+        width: usize,
+        alias: bool,
+    ) -> Result<(), ExportError> {
+        let mut cumulative = cumulative(flakes);
+        cumulative.resize(flakes.clusters().div_ceil(width) * width, 1.0);
+        let about = "cumulative probability of every cluster within its slice";
+        self.floats("cumulative", width, &[("R", &cumulative)], about)?;
+        if alias {
+            self.alias(flakes, width)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn slices(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
         #[allow(clippy::cast_precision_loss)] // below 2^24, exact
         let exact = |n: u32| n as f32;
         let first: Vec<f32> = flakes.offsets[..flakes.slices()]
@@ -267,9 +278,11 @@ impl Textures {
         )
     }
 
-    fn corners(
+    /// Boxes in rows of `width`.
+    pub(super) fn corners(
         &mut self,
-        flakes: &Flakes,
+        lower: &[[f32; 3]],
+        upper: &[[f32; 3]],
         width: usize,
         precision: Precision,
     ) -> Result<(), ExportError> {
@@ -277,12 +290,12 @@ impl Textures {
             "corner of smallest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
         let about_upper =
             "corner of largest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
-        let texels = flakes.clusters().div_ceil(width) * width;
+        let texels = lower.len().div_ceil(width) * width;
         let height = texels / width;
-        let range = Range8::of(flakes);
+        let range = Range8::of(lower, upper);
         let both = [
-            ("corners_lower", &flakes.lower, about_lower),
-            ("corners_upper", &flakes.upper, about_upper),
+            ("corners_lower", lower, about_lower),
+            ("corners_upper", upper, about_upper),
         ];
         for (name, corners, about) in both {
             let entry = |kind| Entry {
@@ -422,7 +435,7 @@ impl Textures {
         Ok(())
     }
 
-    fn random(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
+    pub(super) fn random(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
         static KNOWN: [OnceLock<Vec<u8>>; RandomTexture::KINDS] =
             [const { OnceLock::new() }; RandomTexture::KINDS];
         let tile = RandomTexture::of(&flakes.texture);
@@ -501,10 +514,10 @@ pub(super) struct Range8 {
 }
 
 impl Range8 {
-    pub(super) fn of(flakes: &Flakes) -> Self {
+    pub(super) fn of(lower: &[[f32; 3]], upper: &[[f32; 3]]) -> Self {
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];
-        for corner in flakes.lower.iter().chain(&flakes.upper) {
+        for corner in lower.iter().chain(upper) {
             for k in 0..3 {
                 low[k] = low[k].min(corner[k]);
                 high[k] = high[k].max(corner[k]);

@@ -184,6 +184,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn the_middle_of_a_mean_gives_that_mean(
             center in prop::array::uniform3(-60.0..400.0_f64), log_half in prop::array::uniform3(-4.0..2.0_f64),
@@ -205,7 +206,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(48))]
+        #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn the_closed_form_agrees_with_sums_over_the_box(
             center in prop::array::uniform3(-20.0..120.0_f32), log_half in prop::array::uniform3(-3.0..1.6_f32),

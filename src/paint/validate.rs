@@ -116,6 +116,15 @@ impl CarPaint {
                 )?;
             }
         }
+        for value in self.color_table.overall().to_array() {
+            within(
+                || "color_table.overall".into(),
+                value,
+                -MAX_LAB,
+                MAX_LAB,
+                "-2000 to 2000",
+            )?;
+        }
         self.flakes
             .as_ref()
             .map_or(Ok(()), |flakes| flakes.validate(limits))

@@ -68,6 +68,12 @@ impl Film {
         self.height
     }
 
+    /// Factor on light before tone mapping.
+    #[must_use]
+    pub const fn exposure(&self) -> f32 {
+        self.exposure
+    }
+
     /// Linear light, row by row from the top.
     #[must_use]
     pub fn pixels(&self) -> &[Vec3] {

@@ -7,6 +7,7 @@
 //!
 //! Left to others: which profile asks for how many samples (`accuracy`), meshes, and what a paint is (`paint`).
 
+mod difference;
 mod effects;
 mod environment;
 mod environment_file;
@@ -33,6 +34,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use rayon::prelude::*;
 use serde::Serialize;
 
+pub use difference::{PictureDifference, difference};
 pub use effects::{Effect, EffectPlan, PlannedEffect};
 pub use environment::Environment;
 pub use environment_file::EnvironmentError;

@@ -18,9 +18,10 @@ use super::ids;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::profile::{ProfileDocument, ProfileText};
 use super::runner::{self, Ended, JobDocument, UnderWay};
+use super::targets;
 use super::waiting::Prefer;
 use super::workbench::CalledOff;
-use super::works::Thing;
+use super::works::{Asked, Picked, Target, Thing};
 use crate::accuracy::Profile;
 use crate::paint::PaintFile;
 use crate::store::{BlendRecord, JobKind};
@@ -38,6 +39,12 @@ pub struct BlendOrder {
     /// Clusters per slice, in place of the profile's.
     #[schema(minimum = 1, maximum = 4096)]
     clusters: Option<u32>,
+    /// In place of a profile: the cheapest whose error is at most this, Lab.
+    #[schema(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[schema(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
 }
 
 /// What a job needs to make a blend.
@@ -79,8 +86,10 @@ pub async fn create(
             Problem::value("/paints", detail).accepting(format!("2 to {most} ids of paints"))
         );
     }
+    let knobs = order.profile.is_some() || order.clusters.is_some();
+    let target = targets::of_body(order.max_error, order.max_seconds, knobs)?;
     let asked = order.profile.unwrap_or_default();
-    let profile = asked.with_clusters(order.clusters).of_body()?;
+    let mut profile = asked.with_clusters(order.clusters).of_body()?;
     for (place, id) in order.paints.iter().enumerate() {
         if !ids::is("p_", id) || app.catalogue.paint(id).await?.is_none() {
             return Err(Problem::value(
@@ -90,13 +99,23 @@ pub async fn create(
             .accepting("ids that GET /v1/paints lists"));
         }
     }
+    let whole = (&order.paints, profile, target.max_error, target.max_seconds);
+    let claimed = ids::made_of("b_", &whole);
+    idempotency.claim(&app, &claimed).await?;
+    let picked = if target.is_some() {
+        let picked = pick(&app, &order.paints, target).await?;
+        profile = *picked.profile();
+        Some(picked)
+    } else {
+        None
+    };
     let id = ids::made_of("b_", &(&order.paints, profile));
-    idempotency.claim(&app, &id).await?;
     let address = format!("/v1/blends/{id}");
     if app.catalogue.blend(&id).await?.is_some() {
         let known = app.blend(&id).await?.document.clone();
         let answer = Answer::result("application/json", known, Keep::Revalidated);
-        return Ok(answer.location(&address).into_response());
+        let answer = answer.location(&address).picked(picked.as_ref());
+        return Ok(answer.into_response());
     }
     let request = BlendRequest {
         paints: order.paints,
@@ -104,7 +123,22 @@ pub async fn create(
     };
     let job = runner::submit(&app, JobKind::Blend, &id, &request).await?;
     let made = || async { Ok(app.blend(&id).await?.document.clone()) };
-    prefer.answer(&app, &job, &address, made).await
+    let answer = prefer.answer(&app, &job, &address, made).await?;
+    Ok(targets::told(answer, picked.as_ref()))
+}
+
+/// The profile that meets a target for a blend of these paints.
+async fn pick(app: &App, ids: &[String], target: Target) -> Result<Picked, Problem> {
+    let mut shelved = Vec::with_capacity(ids.len());
+    for id in ids {
+        shelved.push(app.paint(id).await?);
+    }
+    let works = Arc::clone(&app.works);
+    let picked = app.bench.run(move || {
+        let paints: Vec<&PaintFile> = shelved.iter().filter_map(|p| p.file_of_paint()).collect();
+        works.pick(&Asked::Blend { paints: &paints }, &target)
+    });
+    picked.await?.map_err(super::works::WorkError::of_body)
 }
 
 /// The job: finds the correspondence and keeps the blend.
@@ -200,7 +234,7 @@ fn in_order_of_hashes(asked: &[Arc<Shelved>]) -> (Vec<Arc<Shelved>>, Vec<usize>)
 }
 
 impl Shelved {
-    fn file_of_paint(&self) -> Option<&PaintFile> {
+    pub(super) fn file_of_paint(&self) -> Option<&PaintFile> {
         match &self.thing {
             Thing::Paint(file) => Some(file),
             Thing::Blend(_) => None,
@@ -243,6 +277,7 @@ pub(super) fn links(id: &str, paints: &[String], options: &BlendOptions) -> Valu
             "paints": paints.iter().map(|paint| format!("/v1/paints/{paint}")).collect::<Vec<_>>(),
             "preview": format!("{base}/preview.png?weights={weights}"),
             "bundle": format!("{base}/realisation.zip?weights={weights}"),
+            "slider_bundle": format!("{base}/bundle.zip"),
             "glb": format!("{base}/realisation.glb?weights={weights}"),
         }
     })

@@ -8,12 +8,15 @@
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
 //! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`).
 
+mod accuracy;
 mod answer;
 mod app;
+mod blend_bundles;
 mod blends;
 mod docs;
 mod documents;
 mod envelope;
+mod estimates;
 mod extract;
 mod home;
 mod idempotency;
@@ -30,6 +33,7 @@ mod realisations;
 mod runner;
 mod samples;
 mod serve;
+mod targets;
 mod visibility;
 mod waiting;
 mod watchers;
@@ -43,8 +47,8 @@ pub use docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
-    Fault, Format, IngestOrder, Layout, Light, Picture, PictureFormat, Progress, Scene, ThetaH,
-    Thing, View, WorkError, Works,
+    Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
+    Progress, Scene, Target, ThetaH, Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 

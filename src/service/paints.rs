@@ -21,10 +21,11 @@ use super::ids;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::profile::ProfileText;
 use super::runner::{self, Ended, JobDocument, UnderWay};
+use super::targets;
 use super::visibility::Visibility;
 use super::waiting::Prefer;
 use super::workbench::CalledOff;
-use super::works::{Format, IngestOrder, Layout, ThetaH};
+use super::works::{Asked, Format, IngestOrder, Layout, Picked, Target, ThetaH};
 use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
 use crate::workshop::NAME_CHARACTERS;
 
@@ -64,6 +65,12 @@ pub struct IngestQuery {
     /// Clusters per slice, in place of the profile's.
     #[param(minimum = 1, maximum = 4096)]
     clusters: Option<u32>,
+    /// In place of a profile: the cheapest whose error is at most this, Lab.
+    #[param(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[param(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
 }
 
 /// Which paints to list.
@@ -166,7 +173,17 @@ pub async fn upload(
     request: Request,
 ) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
-    let order = query.and_then(|Query(query)| query.order());
+    let target = query.as_ref().map_or_else(
+        |_| Ok(Target::default()),
+        |Query(q)| {
+            targets::of_query(
+                q.max_error,
+                q.max_seconds,
+                q.profile.is_some() || q.clusters.is_some(),
+            )
+        },
+    );
+    let order = query.and_then(|Query(query)| Ok((query.order()?, target?)));
     let order = order.and_then(|order| check_headers(&app, &parts.headers).map(|()| order));
     let (order, idempotency) = match order.and_then(|order| Ok((order, idempotency?))) {
         Ok(asked) => asked,
@@ -176,48 +193,120 @@ pub async fn upload(
         }
     };
     let received = receive(&app, body).await?;
-    let (id, job) = runner::to_its_end(accept(app.clone(), received, order, idempotency)).await?;
+    let accepted = runner::to_its_end(accept(app.clone(), received, order, idempotency)).await?;
+    let Accepted { id, job, picked } = accepted;
     let address = format!("/v1/paints/{id}");
     let Some(job) = job else {
         let known = app.paint(&id).await?.document.clone();
         let answer = Answer::result("application/json", known, Keep::Revalidated);
-        return Ok(answer.location(&address).into_response());
+        let answer = answer.location(&address).picked(picked.as_ref());
+        return Ok(answer.into_response());
     };
     let made = || async { Ok(app.paint(&id).await?.document.clone()) };
-    prefer.answer(&app, &job, &address, made).await
+    let answer = prefer.answer(&app, &job, &address, made).await?;
+    Ok(targets::told(answer, picked.as_ref()))
 }
 
-/// Keeps what was received and has a job make a paint of it, unless there is one: the id of the paint, and the job.
+/// An upload that was kept.
+struct Accepted {
+    /// Id of the paint it becomes.
+    id: String,
+    /// The job that makes it, unless it was made before.
+    job: Option<String>,
+    /// What was picked for a target.
+    picked: Option<Picked>,
+}
+
+/// Keeps what was received and has a job make a paint of it, unless there is one.
 async fn accept(
     app: App,
     received: Box<dyn BlobWriter>,
-    order: IngestOrder,
+    (mut order, target): (IngestOrder, Target),
     idempotency: Idempotency,
-) -> Result<(String, Option<String>), Problem> {
+) -> Result<Accepted, Problem> {
     // Until a job names the upload it must not be swept as nobody's.
-    let naming = app.removal.read().await;
+    let mut naming = app.removal.read().await;
     let stored = received.finish().await?;
+    let whole = (
+        stored.hash.to_string(),
+        &order,
+        target.max_error,
+        target.max_seconds,
+    );
+    let claimed = idempotency.claim(&app, &ids::made_of("p_", &whole)).await;
+    let mut picked = None;
+    let ready = match claimed {
+        Ok(()) if target.is_some() => {
+            // Not held while a place to compute is waited for.
+            drop(naming);
+            let found = pick_for_upload(&app, stored.hash, &order, target).await;
+            naming = app.removal.read().await;
+            match found {
+                Ok(_) if app.blobs.local(stored.hash).await?.is_none() => {
+                    Err(Problem::overloaded())
+                }
+                Ok(found) => {
+                    order.profile = *found.profile();
+                    picked = Some(found);
+                    Ok(())
+                }
+                Err(problem) => Err(problem),
+            }
+        }
+        claimed => claimed,
+    };
+    if let Err(problem) = ready {
+        drop(naming);
+        app.forget_upload(stored.hash).await?;
+        return Err(problem);
+    }
     let id = ids::made_of("p_", &(stored.hash.to_string(), &order));
     if app.catalogue.paint(&id).await?.is_some() {
-        idempotency.claim(&app, &id).await?;
-        return Ok((id, None));
+        return Ok(Accepted {
+            id,
+            job: None,
+            picked,
+        });
     }
     let request = IngestRequest {
         upload: Hash64(stored.hash.to_string()),
         order,
     };
-    let job = match idempotency.claim(&app, &id).await {
-        Ok(()) => runner::submit(&app, JobKind::Ingest, &id, &request).await,
-        Err(problem) => Err(problem),
-    };
+    let job = runner::submit(&app, JobKind::Ingest, &id, &request).await;
     drop(naming);
     match job {
-        Ok(job) => Ok((id, Some(job))),
+        Ok(job) => Ok(Accepted {
+            id,
+            job: Some(job),
+            picked,
+        }),
         Err(problem) => {
             app.forget_upload(stored.hash).await?;
             Err(problem)
         }
     }
+}
+
+async fn pick_for_upload(
+    app: &App,
+    upload: Hash,
+    order: &IngestOrder,
+    target: Target,
+) -> Result<Picked, Problem> {
+    let local = app.blobs.local(upload).await?;
+    let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
+    let (works, order) = (Arc::clone(&app.works), order.clone());
+    let picked = app.bench.run(move || {
+        let asked = Asked::Ingest {
+            upload: local.path(),
+            order: &order,
+        };
+        let folder = local.path().display().to_string();
+        works
+            .pick(&asked, &target)
+            .map_err(|error| error.without(&folder).of_upload())
+    });
+    picked.await?
 }
 
 fn check_headers(app: &App, headers: &HeaderMap) -> Result<(), Problem> {

@@ -17,9 +17,10 @@ use super::idempotency::Idempotency;
 use super::ids;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::profile::{ProfileDocument, ProfileText};
+use super::targets;
 use super::weights::WeightQuery;
 use super::workbench::call_off;
-use super::works::{Light, Picture, PictureFormat, Scene, View};
+use super::works::{Asked, Light, Picked, Picture, PictureFormat, Scene, View};
 use crate::blend::RealisationWeights;
 use crate::store::{CachedResult, Hash};
 
@@ -50,6 +51,12 @@ pub struct ViewQuery {
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `draft,samples_per_pixel=100`.
     #[param(value_type = Option<String>, example = "standard")]
     profile: Option<ProfileText>,
+    /// In place of a profile: the cheapest whose mean error by sampling is at most this, CIEDE2000.
+    #[param(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[param(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
 }
 
 /// `WxH` in pixels.
@@ -102,6 +109,38 @@ impl ViewQuery {
             self.spp.unwrap_or(profile.samples_per_pixel),
             light.transpose()?.map(|light| vec![light]),
         )
+    }
+}
+
+impl ViewQuery {
+    /// The view, with the samples that meet a target where there is one.
+    async fn picked_view(
+        &self,
+        app: &App,
+        thing: &Arc<Shelved>,
+        weights: Option<&RealisationWeights>,
+        format: PreviewFormat,
+    ) -> Result<(View, Option<Picked>), Problem> {
+        let mut view = self.view(app)?;
+        let knobs = self.profile.is_some() || self.spp.is_some();
+        let target = targets::of_query(self.max_error, self.max_seconds, knobs)?;
+        if !target.is_some() {
+            return Ok((view, None));
+        }
+        let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(thing), weights.cloned());
+        let wanted = view.clone();
+        let found = app.bench.run(move || {
+            let asked = Asked::Preview {
+                thing: &thing.thing,
+                weights: weights.as_ref(),
+                view: &wanted,
+                format: format.drawn(),
+            };
+            works.pick(&asked, &target)
+        });
+        let found = found.await?.map_err(super::works::WorkError::of_query)?;
+        view.samples_per_pixel = found.profile().samples_per_pixel;
+        Ok((view, Some(found)))
     }
 }
 
@@ -203,10 +242,15 @@ pub async fn of_blend(
 ) -> Result<Answer, Problem> {
     let blend = app.blend(&id).await?;
     let weights = weights.for_blend(&blend.names)?;
-    let view = query.view(&app)?;
-    let drawn = draw(&app, blend, Some(weights), format.drawn(), view).await?;
+    let weights = Some(weights);
+    let (view, picked) = query
+        .picked_view(&app, &blend, weights.as_ref(), format)
+        .await?;
+    let drawn = draw(&app, blend, weights, format.drawn(), view).await?;
     let report = report_link(&format!("/v1/blends/{id}"), raw.as_deref());
-    Ok(drawn.answer(format).header(header::LINK, &report))
+    Ok(drawn
+        .answer(format, picked.as_ref())
+        .header(header::LINK, &report))
 }
 
 /// A picture of a paint.
@@ -230,10 +274,15 @@ pub async fn of_paint(
     RawQuery(raw): RawQuery,
 ) -> Result<Answer, Problem> {
     let paint = app.paint(&id).await?;
-    let view = query.view(&app)?;
-    let drawn = draw(&app, paint, None, format.drawn(), view).await?;
+    let weights = None;
+    let (view, picked) = query
+        .picked_view(&app, &paint, weights.as_ref(), format)
+        .await?;
+    let drawn = draw(&app, paint, weights, format.drawn(), view).await?;
     let report = report_link(&format!("/v1/paints/{id}"), raw.as_deref());
-    Ok(drawn.answer(format).header(header::LINK, &report))
+    Ok(drawn
+        .answer(format, picked.as_ref())
+        .header(header::LINK, &report))
 }
 
 /// A whole scene.
@@ -306,7 +355,7 @@ pub async fn create(
     let drawn = draw(&app, thing, weights, format.drawn(), view).await;
     Ok(drawn
         .map_err(|problem| problem.in_body("", ""))?
-        .answer(format))
+        .answer(format, None))
 }
 
 impl PreviewOrder {
@@ -465,12 +514,15 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn answer(self, format: PreviewFormat) -> Answer {
+    fn answer(self, format: PreviewFormat, picked: Option<&Picked>) -> Answer {
+        // What a target picks may change with the machine's load.
+        let keep = picked.map_or(Keep::ForEver, |_| Keep::Revalidated);
         let answer = match format {
-            PreviewFormat::Json => Answer::bytes("application/json", self.report, Keep::ForEver),
-            _ => Answer::result(format.drawn().media_type(), self.picture, Keep::ForEver),
+            PreviewFormat::Json => Answer::bytes("application/json", self.report, keep),
+            _ => Answer::result(format.drawn().media_type(), self.picture, keep),
         };
         answer
+            .picked(picked)
             .header(ACCURACY, &self.accuracy)
             .stage("preview", self.time)
     }

@@ -13,8 +13,9 @@ use super::extract::{Address, Query, QueryOfTwo};
 use super::ids;
 use super::problem::{Problem, ProblemDocument};
 use super::profile::ProfileText;
+use super::targets;
 use super::weights::WeightQuery;
-use super::works::Format;
+use super::works::{Asked, Format};
 use crate::blend::RealisationWeights;
 
 /// How accurately a file is written.
@@ -23,7 +24,13 @@ use crate::blend::RealisationWeights;
 pub struct ProfileQuery {
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,precision=f32,draw=alias`.
     #[param(value_type = Option<String>, example = "standard")]
-    profile: Option<ProfileText>,
+    pub(super) profile: Option<ProfileText>,
+    /// In place of a profile: the cheapest whose error is at most this, Lab.
+    #[param(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[param(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
 }
 
 /// A blend at some weights, as a file.
@@ -81,7 +88,24 @@ async fn realise(
     query: ProfileQuery,
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
-    let profile = query.profile.unwrap_or_default().of_query()?;
+    let target = targets::of_query(query.max_error, query.max_seconds, query.profile.is_some())?;
+    let mut profile = query.profile.unwrap_or_default().of_query()?;
+    let mut picked = None;
+    if target.is_some() {
+        let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(&thing), weights.clone());
+        let found = app.bench.run(move || {
+            let (thing, weights) = (&thing.thing, weights.as_ref());
+            let asked = Asked::Realise {
+                thing,
+                weights,
+                format,
+            };
+            works.pick(&asked, &target)
+        });
+        let found = found.await?.map_err(super::works::WorkError::of_query)?;
+        profile = *found.profile();
+        picked = Some(found);
+    }
     let key = ids::key(
         "realisation",
         &(
@@ -108,6 +132,10 @@ async fn realise(
         Ok(bytes.into())
     };
     let result = app.results.get_or_compute(key, compute).await?;
-    let answer = Answer::result(format.media_type(), result, Keep::ForEver).saved_as(&name);
-    Ok(answer.stage("realisation", begun.elapsed()))
+    // What a target picks may change with the machine's load.
+    let keep = picked.as_ref().map_or(Keep::ForEver, |_| Keep::Revalidated);
+    let answer = Answer::result(format.media_type(), result, keep).saved_as(&name);
+    Ok(answer
+        .picked(picked.as_ref())
+        .stage("realisation", begun.elapsed()))
 }

@@ -19,8 +19,8 @@ use super::envelope::envelope;
 use super::extract::JSON_BYTES;
 use super::works::Works;
 use super::{
-    ServiceConfig, blends, docs, home, jobs, operations, paints, previews, realisations, runner,
-    visibility,
+    ServiceConfig, accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations,
+    paints, previews, realisations, runner, visibility,
 };
 use crate::store::StoreError;
 
@@ -76,11 +76,14 @@ pub fn router(app: App) -> Router {
         .route("/v1/blends", axum::routing::post(blends::create))
         .route("/v1/previews", axum::routing::post(previews::create))
         .route("/v1/blends/{id}", get(blends::show))
+        .route("/v1/blends/{id}/bundle.zip", get(blend_bundles::bundle))
         .route(
             "/v1/blends/{id}/realisation.{format}",
             get(realisations::of_blend),
         )
         .route("/v1/blends/{id}/preview.{format}", get(previews::of_blend))
+        .route("/v1/estimates", axum::routing::post(estimates::create))
+        .route("/v1/accuracy", get(accuracy::show))
         .route("/v1/jobs/{id}", get(jobs::show).delete(jobs::cancel))
         .route("/v1/jobs/{id}/events", get(jobs::events))
         .route("/healthz", get(operations::healthz))

@@ -14,7 +14,7 @@ use crate::paint::PaintFile;
 /// Share done, from 0 to 1. It does not return when the work was called off.
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
-pub use crate::workshop::Thing;
+pub use crate::workshop::{Estimate, Picked, Target, Thing};
 
 /// What a measurement file is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -122,6 +122,43 @@ pub struct View {
     pub lights: Option<Vec<Light>>,
 }
 
+/// Work that can be estimated.
+#[derive(Clone, Copy, Debug)]
+pub enum Asked<'a> {
+    /// An upload becomes a paint.
+    Ingest {
+        /// The upload.
+        upload: &'a Path,
+        /// How it is read.
+        order: &'a IngestOrder,
+    },
+    /// Paints become a blend.
+    Blend {
+        /// The paints.
+        paints: &'a [&'a PaintFile],
+    },
+    /// A paint, or a blend at some weights, becomes a file.
+    Realise {
+        /// The paint or blend.
+        thing: &'a Thing,
+        /// Weights of a blend.
+        weights: Option<&'a RealisationWeights>,
+        /// What it is written as.
+        format: Format,
+    },
+    /// A paint, or a blend at some weights, becomes a picture.
+    Preview {
+        /// The paint or blend.
+        thing: &'a Thing,
+        /// Weights of a blend.
+        weights: Option<&'a RealisationWeights>,
+        /// What it shows; the profile says how many samples.
+        view: &'a View,
+        /// What it is written as.
+        format: PictureFormat,
+    },
+}
+
 /// A picture with the account of its accuracy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
@@ -195,6 +232,13 @@ pub trait Works: Debug + Send + Sync {
         profile: &Profile,
     ) -> Result<Vec<u8>, WorkError>;
 
+    /// All paints of a blend become one texture bundle.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for a thing that is no blend.
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError>;
+
     /// A paint, or a blend at some weights, becomes a picture.
     ///
     /// # Errors
@@ -208,6 +252,20 @@ pub trait Works: Debug + Send + Sync {
         format: PictureFormat,
         progress: Progress<'_>,
     ) -> Result<Picture, WorkError>;
+
+    /// What some work will take with a profile.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for what would be refused when it is done.
+    fn estimate(&self, asked: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError>;
+
+    /// The profile that meets a target on some work.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for a target that is none, and what would be refused when the work is done.
+    fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkError>;
 
     /// What is known about a paint or a blend.
     fn describe(&self, thing: &Thing) -> Value;

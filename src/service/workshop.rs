@@ -5,14 +5,14 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Fault, Format, IngestOrder, Layout, Light, Picture, PictureFormat, Progress, Scene, ThetaH,
-    Thing, View, WorkError, Works,
+    Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
+    Progress, Scene, Target, ThetaH, Thing, View, WorkError, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::measurement::{self, ReadOptions, ThetaHSpacing};
 use crate::paint::{Limits, PaintFile};
-use crate::workshop::{self, IngestOptions, PreviewLight, PreviewOptions, WorkshopError};
+use crate::workshop::{self, IngestOptions, PreviewLight, PreviewOptions, Work, WorkshopError};
 
 /// Does the work, within limits.
 #[derive(Clone, Copy, Debug)]
@@ -43,13 +43,8 @@ impl From<WorkshopError> for WorkError {
     }
 }
 
-impl Works for Workshop {
-    fn ingest(
-        &self,
-        upload: &Path,
-        order: &IngestOrder,
-        progress: Progress<'_>,
-    ) -> Result<PaintFile, WorkError> {
+impl Workshop {
+    fn options(&self, order: &IngestOrder) -> IngestOptions {
         let layout = order.layout.map(|layout| match layout {
             Layout::Mpi2005 => measurement::Layout::Mpi2005,
             Layout::Merl => measurement::Layout::Merl,
@@ -60,7 +55,7 @@ impl Works for Workshop {
             ThetaH::Linear => ThetaHSpacing::Linear,
             ThetaH::Sqrt => ThetaHSpacing::SquareRoot,
         });
-        let options = IngestOptions {
+        IngestOptions {
             name: order.name.clone(),
             read: ReadOptions {
                 layout,
@@ -71,7 +66,89 @@ impl Works for Workshop {
             clusters: order.clusters.map(|n| n as usize),
             profile: order.profile,
             limits: self.limits,
-        };
+        }
+    }
+
+    /// The work that was asked for, as the workshop estimates it.
+    fn with_work<T>(&self, asked: &Asked<'_>, then: impl FnOnce(&Work<'_>) -> T) -> T {
+        match *asked {
+            Asked::Ingest { upload, order } => then(&Work::Ingest {
+                path: upload,
+                options: &self.options(order),
+            }),
+            Asked::Blend { paints } => then(&Work::Blend { paints }),
+            Asked::Realise {
+                thing,
+                weights,
+                format,
+            } => then(&Work::Realise {
+                thing,
+                weights,
+                format: format_of(format),
+                written: false,
+            }),
+            Asked::Preview {
+                thing,
+                weights,
+                view,
+                format,
+            } => then(&Work::Preview {
+                thing,
+                weights,
+                options: &options_of(view),
+                format: picture_of(format),
+                limits: &self.limits,
+                written: false,
+            }),
+        }
+    }
+}
+
+const fn format_of(format: Format) -> workshop::Format {
+    match format {
+        Format::Zip => workshop::Format::Zip,
+        Format::Glb => workshop::Format::Glb,
+        Format::Json => workshop::Format::Json,
+        Format::Paint => workshop::Format::Paint,
+    }
+}
+
+const fn picture_of(format: PictureFormat) -> workshop::PictureFormat {
+    match format {
+        PictureFormat::Png => workshop::PictureFormat::Png,
+        PictureFormat::Exr => workshop::PictureFormat::Exr,
+    }
+}
+
+fn options_of(view: &View) -> PreviewOptions {
+    let scene = match view.scene {
+        Scene::Sphere => "sphere",
+        Scene::Capsule => "capsule",
+        Scene::Panel => "panel",
+    };
+    PreviewOptions {
+        scene: scene.to_owned(),
+        size: view.size,
+        samples_per_pixel: view.samples_per_pixel,
+        environment: None,
+        lights: view.lights.as_ref().map(|lights| {
+            let light = |light: &Light| PreviewLight {
+                towards: light.towards,
+                irradiance: light.irradiance,
+            };
+            lights.iter().map(light).collect()
+        }),
+    }
+}
+
+impl Works for Workshop {
+    fn ingest(
+        &self,
+        upload: &Path,
+        order: &IngestOrder,
+        progress: Progress<'_>,
+    ) -> Result<PaintFile, WorkError> {
+        let options = self.options(order);
         Ok(workshop::ingest_upload(upload, &options, progress)?)
     }
 
@@ -91,13 +168,12 @@ impl Works for Workshop {
         format: Format,
         profile: &Profile,
     ) -> Result<Vec<u8>, WorkError> {
-        let format = match format {
-            Format::Zip => workshop::Format::Zip,
-            Format::Glb => workshop::Format::Glb,
-            Format::Json => workshop::Format::Json,
-            Format::Paint => workshop::Format::Paint,
-        };
+        let format = format_of(format);
         Ok(workshop::realise(thing, weights, format, profile)?.bytes)
+    }
+
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError> {
+        Ok(workshop::bundle_blend(blend, profile)?.bytes)
     }
 
     fn preview(
@@ -108,28 +184,7 @@ impl Works for Workshop {
         format: PictureFormat,
         progress: Progress<'_>,
     ) -> Result<Picture, WorkError> {
-        let scene = match view.scene {
-            Scene::Sphere => "sphere",
-            Scene::Capsule => "capsule",
-            Scene::Panel => "panel",
-        };
-        let options = PreviewOptions {
-            scene: scene.to_owned(),
-            size: view.size,
-            samples_per_pixel: view.samples_per_pixel,
-            environment: None,
-            lights: view.lights.as_ref().map(|lights| {
-                let light = |light: &Light| PreviewLight {
-                    towards: light.towards,
-                    irradiance: light.irradiance,
-                };
-                lights.iter().map(light).collect()
-            }),
-        };
-        let format = match format {
-            PictureFormat::Png => workshop::PictureFormat::Png,
-            PictureFormat::Exr => workshop::PictureFormat::Exr,
-        };
+        let (options, format) = (options_of(view), picture_of(format));
         let made = workshop::preview(thing, weights, &options, format, &self.limits, progress)?;
         let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
         let mut accuracy = Vec::new();
@@ -145,6 +200,14 @@ impl Works for Workshop {
             accuracy: accuracy.join(", "),
             report: made.report,
         })
+    }
+
+    fn estimate(&self, asked: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError> {
+        Ok(self.with_work(asked, |work| work.estimate(profile))?)
+    }
+
+    fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkError> {
+        Ok(self.with_work(asked, |work| target.pick(work))?)
     }
 
     fn describe(&self, thing: &Thing) -> Value {

@@ -7,7 +7,9 @@ use super::content::content_hash;
 use super::thing::first_bytes;
 use super::{WorkshopError, read};
 use crate::accuracy::{Profile, clustering_error};
-use crate::fit::{CoatChoice, FittedBase, against_readings, fit_base_telling, fit_flakes};
+use crate::fit::{
+    CoatChoice, FittedBase, against_readings, fit_base, fit_base_telling, fit_flakes,
+};
 use crate::measurement::{
     BrdfMeasurement, HalfAngleTable, Layout, Package, PackageBase, ReadOptions, TableLayout,
     ThetaHSpacing, read_merl, read_mpi, sniff,
@@ -325,6 +327,14 @@ fn ingest_package(
         .and_then(|readings| against_readings(&paint, readings));
     let file = finish(name, provenance, paint, residuals, clustering, warnings);
     Ok(PaintFile { readings, ..file })
+}
+
+/// Fits the table of a package inside its coat.
+pub(super) fn fitted_base(base: &PackageBase, coat: Option<Coat>) -> Result<CarPaint, String> {
+    let table = table_of(base)?;
+    let fitted = fit_base(&table, CoatChoice::Inside(coat.map_or(1.0, |c| c.ior)))
+        .map_err(|e| e.to_string())?;
+    Ok(base_paint(&fitted, coat))
 }
 
 /// The measured table of a package.

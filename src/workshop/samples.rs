@@ -180,7 +180,7 @@ impl Sample {
     /// Everything that its paint is made of, in words: another recipe is another paint.
     #[must_use]
     pub fn recipe(&self) -> String {
-        let flakes = self.flakes.map(|sparkle| sparkle.recipe());
+        let flakes = self.flakes.map(|sparkle| sparkle.recipe(&self.base()));
         format!(
             "{:?}",
             (self.diffuse, self.weights, self.f0, self.alpha, flakes)

@@ -1,5 +1,7 @@
 //! The real binary, as scripts call it.
 
+mod bundle;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -429,7 +431,8 @@ fn clusters_other_than_a_paint_has_are_refused() {
 fn every_command_teaches_itself() {
     let desk = Desk::new();
     for command in [
-        "serve", "ingest", "show", "blend", "realise", "preview", "texels", "evaluate", "samples",
+        "serve", "ingest", "show", "blend", "realise", "preview", "texels", "evaluate", "estimate",
+        "samples",
     ] {
         let help = String::from_utf8(desk.ok(&[command, "--help"]).stdout).expect("text");
         assert!(

@@ -9,9 +9,10 @@ use carpaint::accuracy::Profile;
 use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
-    App, Fault, Format, IngestOrder, Picture, PictureFormat, Progress, ServiceConfig, Thing, View,
-    WorkError, Works, Workshop, open, serve,
+    App, Asked, Estimate, Fault, Format, IngestOrder, Picked, Picture, PictureFormat, Progress,
+    ServiceConfig, Target, Thing, View, WorkError, Works, Workshop, open, serve,
 };
+use carpaint::workshop::EstimatedError;
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
@@ -124,6 +125,10 @@ impl Works for Pretend {
         Ok(format!("{format:?} {diffuse:?}").into_bytes())
     }
 
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError> {
+        carpaint::service::Workshop::new(carpaint::paint::Limits::default()).bundle(blend, profile)
+    }
+
     fn preview(
         &self,
         thing: &Thing,
@@ -143,6 +148,35 @@ impl Works for Pretend {
             bytes: [format!("{format:?} {view:?} ").into_bytes(), paint].concat(),
             accuracy: "sampling-mean-de2000=0.5".to_owned(),
             report: json!({ "clamps": [], "plan": "whatever" }),
+        })
+    }
+
+    fn estimate(&self, _: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError> {
+        Ok(Estimate {
+            profile: profile.name(),
+            knobs: *profile,
+            seconds: 0.5,
+            stages: Vec::new(),
+            bytes: 1000,
+            error: EstimatedError {
+                value: 0.25,
+                unit: "Lab",
+            },
+        })
+    }
+
+    fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkError> {
+        let draft = target.max_error.is_none_or(|most| most > 1.0);
+        let profile = if draft {
+            Profile::draft()
+        } else {
+            Profile::reference()
+        };
+        Ok(Picked {
+            target: *target,
+            met: true,
+            estimate: self.estimate(asked, &profile)?,
+            tried: 2,
         })
     }
 

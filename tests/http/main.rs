@@ -1,5 +1,6 @@
 //! The service end to end, over real connections on a port of its own.
 
+mod bundle;
 mod client;
 mod house;
 mod kill;

@@ -147,14 +147,20 @@ pub fn pairs(count: usize) -> Vec<(Direction, Direction)> {
     let mut random = Stream(77);
     (0..count)
         .map(|k| {
-            let wi = at(random.within(0.05, 1.0), random.within(0.0, 6.28));
+            let wi = at(
+                random.within(0.05, 1.0),
+                random.within(0.0, std::f64::consts::TAU),
+            );
             let wo = if k % 3 == 0 {
                 let tilt = random.within(-0.02, 0.02);
                 let turned = [-wi[0] + tilt, -wi[1], wi[2]];
                 let length = turned.iter().map(|v| v * v).sum::<f64>().sqrt();
                 turned.map(|v| v / length)
             } else {
-                at(random.within(0.05, 1.0), random.within(0.0, 6.28))
+                at(
+                    random.within(0.05, 1.0),
+                    random.within(0.0, std::f64::consts::TAU),
+                )
             };
             (wi, wo)
         })

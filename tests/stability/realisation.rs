@@ -32,7 +32,7 @@ fn assert_sound(paint: &CarPaint, what: &str) {
     }
     let reflectance = Reflectance::new(paint);
     let grazing = [
-        (at(1e-8, 0.0), at(1e-8, 3.14)),
+        (at(1e-8, 0.0), at(1e-8, std::f64::consts::PI)),
         (at(1.0, 0.0), at(1e-300, 0.0)),
     ];
     for (wi, wo) in pairs(40).into_iter().chain(grazing) {

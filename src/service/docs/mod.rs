@@ -12,8 +12,8 @@ use super::answer::{Answer, Keep};
 use super::extract::Address;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::{
-    blends, documents, jobs, operations, paints, previews, profile, realisations, runner,
-    visibility, works,
+    accuracy, blend_bundles, blends, documents, estimates, jobs, operations, paints, previews,
+    profile, realisations, runner, visibility, works,
 };
 
 /// Only what this service itself serves.
@@ -30,15 +30,16 @@ const POLICY: &str =
     ),
     paths(
         paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete, visibility::change,
-        blends::create, blends::show,
+        blends::create, blends::show, blend_bundles::bundle,
         realisations::of_blend, realisations::of_paint,
         previews::of_blend, previews::of_paint, previews::create,
+        estimates::create, accuracy::show,
         jobs::show, jobs::events, jobs::cancel,
         operations::healthz, operations::readyz, operations::metrics,
     ),
     components(schemas(
         documents::PaintDocument, documents::PaintList, documents::PaintSummary, documents::BlendDocument,
-        blends::BlendOrder, profile::ProfileDocument, profile::KnobsDocument, runner::JobDocument, operations::Health, ProblemDocument,
+        blends::BlendOrder, profile::ProfileDocument, profile::KnobsDocument, estimates::EstimateOrder, estimates::EstimateDocument, runner::JobDocument, operations::Health, ProblemDocument,
         works::Layout, works::ThetaH, works::Format, previews::PreviewFormat, previews::PreviewOrder, works::Light, works::Scene,
     )),
     tags(
@@ -46,6 +47,7 @@ const POLICY: &str =
         (name = "blends", description = "Correspondences of two to five paints"),
         (name = "realisations", description = "Paints, and blends at some weights, as files"),
         (name = "previews", description = "The same as pictures"),
+        (name = "accuracy", description = "What accuracy costs, and what a request will"),
         (name = "jobs", description = "Work that takes longer"),
         (name = "operations", description = "For the operator"),
     )

@@ -56,6 +56,31 @@ pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, 
     Ok(Estimate::new(&options.profile, stages, bytes, error))
 }
 
+/// What a name means, to estimate work on it: files that are paints or blends as they are, of measurements and samples a
+/// few angles, with what opening them in full will take.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for what cannot be opened.
+pub fn sample_to_estimate(
+    name: &str,
+    options: &IngestOptions,
+) -> Result<(Vec<Stage>, Thing), WorkshopError> {
+    if let Source::Path(path) = find(name)?
+        && !is_measurement(&path)?
+    {
+        let (seconds, thing) = timed(|| open(name, options, &|_| ()));
+        let read = Stage {
+            stage: "read",
+            seconds,
+        };
+        return Ok((vec![read], thing?));
+    }
+    let Sampled { paints, stages, .. } = sample(name, options)?;
+    let [_, paint] = paints;
+    Ok((stages, Thing::Paint(Box::new(paint))))
+}
+
 /// Opens what a name means, of a measurement or of a sample only some angles.
 pub(super) fn sample(name: &str, options: &IngestOptions) -> Result<Sampled, WorkshopError> {
     match find(name)? {

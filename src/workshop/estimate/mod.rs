@@ -12,15 +12,17 @@ mod blend;
 mod ingest;
 mod preview;
 mod realise;
+mod work;
 
 use std::time::Instant;
 
 use serde::Serialize;
 
 pub use blend::{estimate_blend, estimate_blend_of};
-pub use ingest::estimate_ingest;
+pub use ingest::{estimate_ingest, sample_to_estimate};
 pub use preview::estimate_preview;
 pub use realise::estimate_realise;
+pub use work::Work;
 
 use crate::accuracy::Profile;
 
@@ -67,6 +69,15 @@ impl EstimatedError {
 }
 
 impl Estimate {
+    /// The same with stages that come before.
+    #[must_use]
+    pub fn after(mut self, mut before: Vec<Stage>) -> Self {
+        self.seconds += before.iter().map(|stage| stage.seconds).sum::<f64>();
+        before.append(&mut self.stages);
+        self.stages = before;
+        self
+    }
+
     fn new(profile: &Profile, stages: Vec<Stage>, bytes: f64, error: EstimatedError) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a size
         let bytes = bytes.max(0.0).round() as u64;

@@ -1,0 +1,168 @@
+//! Error against time of one kind of work, its Pareto front, and the knee of that.
+
+use serde::{Deserialize, Serialize};
+
+use crate::accuracy::{PRESETS, Profile};
+
+/// One profile, measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// What distinguishes it, for people.
+    pub label: String,
+    /// The knob that was turned, `together` for several.
+    pub knob: String,
+    /// All knobs.
+    pub knobs: Profile,
+    /// Wall time, seconds.
+    pub seconds: f64,
+    /// Error, in the front's unit.
+    pub error: f64,
+    /// Size of the result, where it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bytes: Option<u64>,
+    /// What else was measured, by name.
+    #[serde(default, skip_serializing_if = "std::collections::BTreeMap::is_empty")]
+    pub more: std::collections::BTreeMap<String, f64>,
+    /// Whether nothing measured is both faster and more accurate.
+    pub on_front: bool,
+}
+
+/// Error against time of one kind of work.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Front {
+    /// `ingest`, `blend`, `realise` or `preview`.
+    pub work: String,
+    /// What the work is, for people.
+    pub about: String,
+    /// What the error is.
+    pub error_is: String,
+    /// Unit of the error.
+    pub unit: String,
+    /// Everything that was measured, by time.
+    pub points: Vec<Point>,
+    /// Label of the knee.
+    pub knee: String,
+}
+
+impl Front {
+    /// Orders points by time, finds the front and its knee.
+    #[must_use]
+    pub fn new(
+        work: &str,
+        about: &str,
+        error_is: &str,
+        unit: &str,
+        mut points: Vec<Point>,
+    ) -> Self {
+        points.sort_by(|x, y| {
+            x.seconds
+                .total_cmp(&y.seconds)
+                .then(x.error.total_cmp(&y.error))
+        });
+        let mut least = f64::INFINITY;
+        for point in &mut points {
+            // Two hundredths less is no more accurate than what is measured twice.
+            point.on_front = point.error < least * 0.98;
+            if point.on_front {
+                least = point.error;
+            }
+        }
+        let on_front: Vec<(f64, f64)> = points
+            .iter()
+            .filter(|p| p.on_front)
+            .map(|p| (p.seconds, p.error))
+            .collect();
+        let knee = knee(&on_front).and_then(|k| points.iter().filter(|p| p.on_front).nth(k));
+        Self {
+            work: work.to_owned(),
+            about: about.to_owned(),
+            error_is: error_is.to_owned(),
+            unit: unit.to_owned(),
+            knee: knee.map_or_else(String::new, |p| p.label.clone()),
+            points,
+        }
+    }
+
+    /// The preset's own point: the one with its very settings, as far as this work looks at them.
+    #[must_use]
+    pub fn preset(&self, name: &str) -> Option<&Point> {
+        self.points.iter().find(|p| p.label == name)
+    }
+
+    /// Presets that were measured, the cheapest first.
+    pub fn presets(&self) -> impl Iterator<Item = (&'static str, &Point)> {
+        PRESETS
+            .iter()
+            .filter_map(|&name| Some((name, self.preset(name)?)))
+    }
+
+    /// How far above the front a point's error is at its time, as a factor of at least 1.
+    #[must_use]
+    pub fn above_front(&self, point: &Point) -> f64 {
+        let best = self
+            .points
+            .iter()
+            .filter(|p| p.seconds <= point.seconds)
+            .map(|p| p.error)
+            .fold(point.error, f64::min);
+        if best > 0.0 { point.error / best } else { 1.0 }
+    }
+}
+
+/// The point of a falling curve that is farthest below the line between its ends, both axes logarithmic: from there on
+/// time grows faster than the error falls (after Satopää et al., "Finding a kneedle in a haystack", 2011).
+fn knee(front: &[(f64, f64)]) -> Option<usize> {
+    let (first, last) = (front.first()?, front.last()?);
+    let log = |&(t, e): &(f64, f64)| (t.max(1e-9).ln(), e.max(1e-9).ln());
+    let ((t0, e0), (t1, e1)) = (log(first), log(last));
+    if t1 <= t0 || e1 >= e0 {
+        return Some(0);
+    }
+    let below = |point: &(f64, f64)| {
+        let (t, e) = log(point);
+        (1.0 - (t - t0) / (t1 - t0)) - (e - e1) / (e0 - e1)
+    };
+    (0..front.len()).max_by(|&x, &y| below(&front[x]).total_cmp(&below(&front[y])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(label: &str, seconds: f64, error: f64) -> Point {
+        Point {
+            label: label.to_owned(),
+            knob: "clusters".to_owned(),
+            knobs: Profile::standard(),
+            seconds,
+            error,
+            bytes: None,
+            more: std::collections::BTreeMap::new(),
+            on_front: false,
+        }
+    }
+
+    #[test]
+    fn nothing_on_the_front_is_beaten_in_both() {
+        let points = vec![
+            point("slow", 10.0, 0.1),
+            point("beaten", 5.0, 0.9),
+            point("fast", 1.0, 1.0),
+            point("good", 2.0, 0.2),
+        ];
+        let front = Front::new("blend", "", "", "Lab", points);
+        let on: Vec<&str> = front
+            .points
+            .iter()
+            .filter(|p| p.on_front)
+            .map(|p| p.label.as_str())
+            .collect();
+        assert_eq!(on, ["fast", "good", "slow"]);
+        assert_eq!(front.knee, "good");
+        let beaten = &front.points[2];
+        assert!(
+            (front.above_front(beaten) - 4.5).abs() < 1e-12,
+            "{beaten:?}"
+        );
+    }
+}

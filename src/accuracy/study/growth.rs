@@ -1,0 +1,69 @@
+//! Time against size, with its exponent.
+
+use serde::{Deserialize, Serialize};
+
+/// How the time of some work grows with its size.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Growth {
+    /// What grows: `slices`, `pixels`, …
+    pub with: String,
+    /// What is done.
+    pub about: String,
+    /// Sizes and seconds.
+    pub points: Vec<[f64; 2]>,
+    /// Exponent p of the fitted `seconds = c size^p`.
+    pub exponent: f64,
+    /// What it should be at most.
+    pub limit: f64,
+}
+
+/// Room for noise in a measured exponent that should be exactly 1.
+const NOISE: f64 = 0.1;
+
+impl Growth {
+    /// Fits the exponent, by least squares on logarithms.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)] // a few points
+    pub fn new(with: &str, about: &str, limit: f64, points: Vec<[f64; 2]>) -> Self {
+        let logs: Vec<(f64, f64)> = points
+            .iter()
+            .map(|[size, seconds]| (size.ln(), seconds.max(1e-9).ln()))
+            .collect();
+        let n = logs.len().max(1) as f64;
+        let (mx, my) = (
+            logs.iter().map(|l| l.0).sum::<f64>() / n,
+            logs.iter().map(|l| l.1).sum::<f64>() / n,
+        );
+        let (xy, xx) = logs.iter().fold((0.0, 0.0), |(xy, xx), (x, y)| {
+            (xy + (x - mx) * (y - my), xx + (x - mx) * (x - mx))
+        });
+        Self {
+            with: with.to_owned(),
+            about: about.to_owned(),
+            points,
+            exponent: if xx > 0.0 { xy / xx } else { 0.0 },
+            limit,
+        }
+    }
+
+    /// Whether the exponent keeps to its limit, within what such a fit scatters.
+    #[must_use]
+    pub fn is_within(&self) -> bool {
+        self.exponent <= self.limit + NOISE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_power_law_gives_its_exponent_back() {
+        let points = [1.0, 2.0, 5.0, 11.0]
+            .map(|n: f64| [n, 0.3 * n.powf(1.4)])
+            .to_vec();
+        let growth = Growth::new("clusters", "", 1.6, points);
+        assert!((growth.exponent - 1.4).abs() < 1e-12);
+        assert!(growth.is_within());
+    }
+}

@@ -1,0 +1,207 @@
+//! `carpaint estimate`: what a command will take, before it is run.
+
+use std::path::Path;
+use std::time::Instant;
+
+use clap::{Args, Subcommand, ValueEnum};
+use serde_json::json;
+
+use super::ingest::ReadingArgs;
+use super::output;
+use super::preview::Size;
+use super::profile::ProfileArgs;
+use super::weights::WeightArgs;
+use crate::workshop::{
+    Estimate as Estimated, Format, IngestOptions, PictureFormat, PreviewOptions, Stage, Work,
+    WorkshopError, open, sample_to_estimate,
+};
+
+/// Estimate seconds, bytes and error of a command before running it.
+///
+/// A small part of the work is done, on this machine and now, and the rest is reckoned from it. With --max-error or
+/// --max-seconds it says which profile would be picked.
+#[derive(Args, Clone, Debug)]
+pub struct Estimate {
+    #[command(subcommand)]
+    work: What,
+}
+
+#[derive(Subcommand, Clone, Debug)]
+enum What {
+    /// Of `carpaint ingest`.
+    Ingest {
+        /// The measurement.
+        #[arg(value_name = "INPUT")]
+        input: String,
+        #[command(flatten)]
+        profile: ProfileArgs,
+    },
+    /// Of `carpaint blend`, opening and ingesting included.
+    Blend {
+        /// The paints.
+        #[arg(value_name = "INPUT", required = true, num_args = 1..)]
+        inputs: Vec<String>,
+        #[command(flatten)]
+        profile: ProfileArgs,
+    },
+    /// Of `carpaint realise`.
+    Realise {
+        /// A .blend, or a .paint or sample, which need no weights.
+        #[arg(value_name = "BLEND")]
+        input: String,
+        #[command(flatten)]
+        weights: WeightArgs,
+        /// What is to be written.
+        #[arg(long, value_enum, value_name = "FORMAT", default_value = "zip")]
+        format: FormatName,
+        #[command(flatten)]
+        profile: ProfileArgs,
+    },
+    /// Of `carpaint preview`.
+    Preview {
+        /// A .paint, a .blend, a sample or a measurement.
+        #[arg(value_name = "PAINT|BLEND|sample")]
+        input: String,
+        #[command(flatten)]
+        weights: WeightArgs,
+        /// What the paint is on: sphere, capsule or panel.
+        #[arg(long, value_name = "SHAPE", default_value = "sphere")]
+        scene: String,
+        /// Width and height in pixels.
+        #[arg(long, value_name = "WxH", default_value = "512x512")]
+        size: Size,
+        /// Samples per pixel, in place of the profile's.
+        #[arg(long, value_name = "N")]
+        spp: Option<u32>,
+        #[command(flatten)]
+        profile: ProfileArgs,
+    },
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FormatName {
+    Zip,
+    Glb,
+    Json,
+    Paint,
+}
+
+impl Estimate {
+    pub fn run(&self, as_json: bool) -> Result<(), WorkshopError> {
+        let begun = Instant::now();
+        let profile = match &self.work {
+            What::Ingest { profile, .. }
+            | What::Blend { profile, .. }
+            | What::Realise { profile, .. }
+            | What::Preview { profile, .. } => profile,
+        };
+        let options = ReadingArgs::default().options(None, profile)?;
+        let estimate = self.estimate(profile, &options)?;
+        if as_json {
+            let mut told = serde_json::to_value(&estimate).map_err(WorkshopError::internal)?;
+            told["estimated_in_seconds"] = json!(begun.elapsed().as_secs_f64());
+            return output::print_json(&told);
+        }
+        let stages: Vec<String> = estimate
+            .stages
+            .iter()
+            .map(|s| format!("{} {:.3}", s.stage, s.seconds))
+            .collect();
+        println!("profile: {}", estimate.profile);
+        println!("seconds: {:.3} ({})", estimate.seconds, stages.join(", "));
+        println!("bytes: {}", estimate.bytes);
+        println!("error: {:.4} {}", estimate.error.value, estimate.error.unit);
+        Ok(())
+    }
+
+    fn estimate(
+        &self,
+        args: &ProfileArgs,
+        options: &IngestOptions,
+    ) -> Result<Estimated, WorkshopError> {
+        let of = |work: &Work<'_>| match args.pick(work)? {
+            Some(picked) => {
+                eprintln!("target {}", picked.line());
+                Ok(picked.estimate)
+            }
+            None => work.estimate(&options.profile),
+        };
+        match &self.work {
+            What::Ingest { input, .. } => of(&Work::Ingest {
+                path: Path::new(input),
+                options,
+            }),
+            What::Blend { inputs, .. } => of(&Work::BlendNames {
+                names: inputs,
+                options,
+            }),
+            What::Realise {
+                input,
+                weights,
+                format,
+                ..
+            } => {
+                let begun = Instant::now();
+                let thing = open(input, options, &|_| ())?;
+                let opened = opening(begun);
+                let weights = weights.for_thing(&thing)?;
+                let format = match format {
+                    FormatName::Zip => Format::Zip,
+                    FormatName::Glb => Format::Glb,
+                    FormatName::Json => Format::Json,
+                    FormatName::Paint => Format::Paint,
+                };
+                let estimate = of(&Work::Realise {
+                    thing: &thing,
+                    weights: weights.as_ref(),
+                    format,
+                    written: true,
+                })?;
+                Ok(estimate.after(vec![opened]))
+            }
+            What::Preview {
+                input,
+                weights,
+                scene,
+                size,
+                spp,
+                ..
+            } => {
+                let (opened, thing) = sample_to_estimate(input, options)?;
+                let weights = weights.for_thing(&thing)?;
+                let mut profile = options.profile;
+                profile.samples_per_pixel = spp.unwrap_or(profile.samples_per_pixel);
+                let view = PreviewOptions {
+                    scene: scene.clone(),
+                    size: [size.width, size.height],
+                    samples_per_pixel: profile.samples_per_pixel,
+                    environment: None,
+                    lights: None,
+                };
+                let work = Work::Preview {
+                    thing: &thing,
+                    weights: weights.as_ref(),
+                    options: &view,
+                    format: PictureFormat::Png,
+                    limits: &options.limits,
+                    written: true,
+                };
+                let estimate = match args.pick(&work)? {
+                    Some(picked) => {
+                        eprintln!("target {}", picked.line());
+                        picked.estimate
+                    }
+                    None => work.estimate(&profile)?,
+                };
+                Ok(estimate.after(opened))
+            }
+        }
+    }
+}
+
+fn opening(begun: Instant) -> Stage {
+    Stage {
+        stage: "open",
+        seconds: begun.elapsed().as_secs_f64(),
+    }
+}

@@ -1,0 +1,124 @@
+//! How time grows with the size of the work.
+
+use super::material::clustered;
+use super::{Material, StudyOptions, Tell, WorkshopError, shortest};
+use crate::accuracy::Profile;
+use crate::accuracy::study::Growth;
+use crate::fit::{BoxRule, ClusterSettings, Clusterer};
+use crate::measurement::SliceRoom;
+use crate::paint::{CarPaint, PaintFile};
+use crate::render::{self, Scene, Shape};
+use crate::workshop::blend_paints;
+
+/// Measures all curves.
+pub(super) fn measure(
+    material: &mut Material,
+    options: &StudyOptions,
+    tell: Tell<'_>,
+) -> Result<Vec<Growth>, WorkshopError> {
+    let goes = if options.quick { 2 } else { 5 };
+    tell("growth with slices", 0.92);
+    let slices = slices(material, goes)?;
+    tell("growth with texels", 0.94);
+    let texels = texels(material, goes)?;
+    tell("growth with clusters", 0.95);
+    let clusters = clusters(material, goes)?;
+    tell("growth with paints", 0.97);
+    let paints = paints(material, goes)?;
+    tell("growth with pixels", 0.98);
+    let pixels = pixels(material, goes)?;
+    tell("growth", 1.0);
+    Ok(vec![slices, texels, clusters, paints, pixels])
+}
+
+fn blend_of(paints: &[PaintFile], goes: usize) -> Result<f64, WorkshopError> {
+    let paints: Vec<&PaintFile> = paints.iter().collect();
+    let go = || blend_paints(&paints, &Profile::standard(), &|_| ());
+    shortest(goes, go).map(|(seconds, _)| seconds)
+}
+
+/// Blending paints of which every so many-th slice is left: the angles stay spread over the same range.
+fn slices(material: &mut Material, goes: usize) -> Result<Growth, WorkshopError> {
+    let standard = Profile::standard().flakes;
+    let whole: Vec<PaintFile> = material.fitted(&standard, 2)?.to_vec();
+    let mut points = Vec::new();
+    for step in [4, 3, 2, 1] {
+        let thinned: Vec<PaintFile> = whole
+            .iter()
+            .map(|file| PaintFile {
+                paint: CarPaint {
+                    flakes: file.paint.flakes.as_ref().map(|f| f.thinned(step)),
+                    ..file.paint.clone()
+                },
+                ..file.clone()
+            })
+            .collect();
+        let flakes = thinned[0].paint.flakes.as_ref();
+        let count = flakes.map_or(0, crate::paint::Flakes::slices);
+        points.push([count as f64, blend_of(&thinned, goes)?]);
+    }
+    Ok(Growth::new("slices", "blending two paints", 1.0, points))
+}
+
+/// Clustering a picture, and the same picture beside itself 4 and 16 times.
+fn texels(material: &Material, goes: usize) -> Result<Growth, WorkshopError> {
+    let source = &material.sources()[0];
+    let mut room = SliceRoom::default();
+    let refused = |e: &dyn std::fmt::Display| WorkshopError::input(&source.name, e);
+    source.flakes.read(0, &mut room).map_err(|e| refused(&e))?;
+    let mut points = Vec::new();
+    for times in [1_usize, 4, 16, 64] {
+        let planes = room
+            .picture
+            .planes
+            .each_ref()
+            .map(|plane| plane.repeat(times));
+        let planes = planes.each_ref().map(Vec::as_slice);
+        let mut clusterer = Clusterer::default();
+        let (seconds, _) = shortest(goes.max(3), || {
+            clusterer
+                .cluster(planes, &ClusterSettings::default())
+                .map_err(|e| refused(&e))
+        })?;
+        points.push([planes[0].len() as f64, seconds]);
+    }
+    Ok(Growth::new("texels", "clustering a slice", 1.0, points))
+}
+
+fn clusters(material: &mut Material, goes: usize) -> Result<Growth, WorkshopError> {
+    let mut points = Vec::new();
+    for n in [24, 50, 100, 200] {
+        let fits = material
+            .fitted(&clustered(n, BoxRule::Moments, 1), 2)?
+            .to_vec();
+        points.push([n as f64, blend_of(&fits, goes)?]);
+    }
+    Ok(Growth::new("clusters", "blending two paints", 1.6, points))
+}
+
+/// Blends of ever more paints, as many as the study has.
+fn paints(material: &mut Material, goes: usize) -> Result<Growth, WorkshopError> {
+    let fits = material.fitted(&Profile::standard().flakes, 5)?.to_vec();
+    let mut points = Vec::new();
+    for count in 2..=fits.len() {
+        points.push([count as f64, blend_of(&fits[..count], goes)?]);
+    }
+    Ok(Growth::new("paints", "blending them all", 1.0, points))
+}
+
+fn pixels(material: &mut Material, goes: usize) -> Result<Growth, WorkshopError> {
+    let paint = material.fitted(&Profile::standard().flakes, 1)?[0]
+        .paint
+        .clone();
+    let mut points = Vec::new();
+    for side in [32, 64, 128] {
+        let scene = Scene {
+            samples_per_pixel: 8,
+            ..Scene::new(Shape::Sphere, [side; 2])
+        };
+        let go = || render::render(&paint, &scene, &|_| ()).map_err(WorkshopError::internal);
+        let (seconds, _) = shortest(goes, go)?;
+        points.push([f64::from(side * side), seconds]);
+    }
+    Ok(Growth::new("pixels", "drawing a ball", 1.0, points))
+}

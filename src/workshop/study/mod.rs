@@ -1,0 +1,71 @@
+//! The study: turning the knobs, one at a time and together, with a stopwatch.
+//!
+//! Every figure is of the functions that requests run, on all threads of the current pool, as they are: the shortest of a
+//! few goes, since what comes between makes work longer and never shorter.
+
+mod fronts;
+mod growth;
+mod material;
+
+use std::time::Instant;
+
+pub use material::Material;
+
+use super::WorkshopError;
+use crate::accuracy::study::Study;
+
+/// How thorough a study is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StudyOptions {
+    /// Fewer settings, smaller pictures, one go each.
+    pub quick: bool,
+}
+
+/// Tells what is being measured and the share done.
+pub type Tell<'a> = &'a (dyn Fn(&str, f32) + Sync);
+
+/// Measures what accuracy costs on these paints, which must be measurements or samples with flakes.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for fewer than two paints with pictures of flakes, and what the work itself refuses.
+pub fn study(
+    names: &[String],
+    options: &StudyOptions,
+    tell: Tell<'_>,
+) -> Result<Study, WorkshopError> {
+    let begun = Instant::now();
+    let mut material = Material::open(names)?;
+    let ingest = fronts::ingest(&mut material, options, tell)?;
+    let blend = fronts::blend(&mut material, options, tell)?;
+    let realise = fronts::realise(&mut material, options, tell)?;
+    let preview = fronts::preview(&mut material, options, tell)?;
+    let growth = growth::measure(&mut material, options, tell)?;
+    Ok(Study {
+        format: "carpaint study".to_owned(),
+        version: 1,
+        program: env!("CARGO_PKG_VERSION").to_owned(),
+        threads: rayon::current_num_threads(),
+        paints: material.names(),
+        quick: options.quick,
+        seconds: begun.elapsed().as_secs_f64(),
+        fronts: vec![ingest, blend, realise, preview],
+        growth,
+    })
+}
+
+/// The shortest of some goes: seconds, and what the last one gave.
+fn shortest<T>(
+    goes: usize,
+    mut work: impl FnMut() -> Result<T, WorkshopError>,
+) -> Result<(f64, T), WorkshopError> {
+    let mut least = f64::INFINITY;
+    let mut made = None;
+    for _ in 0..goes.max(1) {
+        let begun = Instant::now();
+        made = Some(work()?);
+        least = least.min(begun.elapsed().as_secs_f64());
+    }
+    let made = made.ok_or_else(|| WorkshopError::internal("no go at all"))?;
+    Ok((least, made))
+}

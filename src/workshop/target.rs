@@ -1,0 +1,302 @@
+//! A target in place of knobs: the cheapest profile that is accurate enough, or the most accurate that is fast enough.
+//!
+//! Every profile of a short ladder is estimated on the work itself; where an estimate's error is of a sample of the
+//! slices, the error is measured in full before a profile is picked for it. What is picked for a time limit depends on
+//! the machine; the result depends on the profile picked and on nothing else.
+
+use serde::Serialize;
+
+use super::estimate::{Estimate, Work};
+use super::realising::{choose, error_of};
+use super::{WorkshopError, blend_paints};
+use crate::accuracy::{Profile, blend_error, file_error, writing_error};
+use crate::blend::{BlendSettings, Order};
+use crate::export::{ExportSettings, Precision};
+use crate::fit::ClusterSettings;
+use crate::transport::Method;
+
+/// What a result should keep to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Target {
+    /// Largest error: Lab for flakes, CIEDE2000 for pictures.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_error: Option<f64>,
+    /// Longest time, seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_seconds: Option<f64>,
+}
+
+/// A profile picked for a target.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Picked {
+    /// What was asked for.
+    pub target: Target,
+    /// Whether it is met; if not, this is the best that could be done.
+    pub met: bool,
+    /// The profile, and what the work will take with it.
+    pub estimate: Estimate,
+    /// How many profiles were looked at.
+    pub tried: usize,
+}
+
+impl Picked {
+    /// The profile.
+    #[must_use]
+    pub const fn profile(&self) -> &Profile {
+        &self.estimate.knobs
+    }
+
+    /// In one line.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let Estimate {
+            profile,
+            seconds,
+            error,
+            ..
+        } = &self.estimate;
+        format!(
+            "{}; profile={profile}, error={:.4} {}, seconds={seconds:.3}",
+            if self.met { "met" } else { "not met" },
+            error.value,
+            error.unit
+        )
+    }
+}
+
+impl Target {
+    /// Whether anything is asked for.
+    #[must_use]
+    pub const fn is_some(&self) -> bool {
+        self.max_error.is_some() || self.max_seconds.is_some()
+    }
+
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkshopError`] for a limit that is not above 0.
+    pub fn check(&self) -> Result<(), WorkshopError> {
+        for (name, value) in [
+            ("max_error", self.max_error),
+            ("max_seconds", self.max_seconds),
+        ] {
+            if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
+                let problem = format!("{name} is {value}, accepted is a number above 0");
+                return Err(WorkshopError::usage(name, problem));
+            }
+        }
+        Ok(())
+    }
+
+    fn is_met(&self, estimate: &Estimate) -> bool {
+        self.max_error
+            .is_none_or(|most| estimate.error.value <= most)
+            && self.max_seconds.is_none_or(|most| estimate.seconds <= most)
+    }
+
+    /// Picks a profile for some work.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkshopError`] for limits that are none, and for what would be refused when the work is done.
+    pub fn pick(&self, work: &Work<'_>) -> Result<Picked, WorkshopError> {
+        self.check()?;
+        let mut estimates = Vec::new();
+        for profile in ladder(work) {
+            let mut estimate = work.estimate(&profile)?;
+            if self.max_error.is_some() {
+                measure_error(work, &profile, &mut estimate)?;
+            }
+            estimates.push(estimate);
+        }
+        let tried = estimates.len();
+        let estimate = self
+            .best(estimates)
+            .ok_or_else(|| WorkshopError::internal("there is no profile to pick from"))?;
+        Ok(Picked {
+            target: *self,
+            met: self.is_met(&estimate),
+            estimate,
+            tried,
+        })
+    }
+
+    /// With a largest error the fastest that meets all, with a longest time alone the most accurate; where none does, the
+    /// most accurate in time, and where none is in time, the fastest.
+    fn best(&self, estimates: Vec<Estimate>) -> Option<Estimate> {
+        let faster = |x: &Estimate, y: &Estimate| x.seconds.total_cmp(&y.seconds);
+        let finer = |x: &Estimate, y: &Estimate| {
+            x.error
+                .value
+                .total_cmp(&y.error.value)
+                .then(x.seconds.total_cmp(&y.seconds))
+        };
+        let in_time: Vec<Estimate> = (estimates.iter())
+            .filter(|e| self.max_seconds.is_none_or(|most| e.seconds <= most))
+            .cloned()
+            .collect();
+        if in_time.is_empty() {
+            return estimates.into_iter().min_by(faster);
+        }
+        let met = in_time.iter().filter(|e| self.is_met(e));
+        let fastest = met.min_by(|x, y| faster(x, y)).cloned();
+        match (fastest, self.max_error) {
+            (Some(fastest), Some(_)) => Some(fastest),
+            _ => in_time.into_iter().min_by(finer),
+        }
+    }
+}
+
+/// Profiles to pick from, by what the work's accuracy depends on.
+fn ladder(work: &Work<'_>) -> Vec<Profile> {
+    let standard = Profile::standard();
+    let clustered = |clusters, angle_step| ClusterSettings {
+        clusters,
+        angle_step,
+        ..standard.flakes
+    };
+    match work {
+        Work::Ingest { .. } => [
+            (24, 2),
+            (12, 1),
+            (24, 1),
+            (50, 1),
+            (100, 1),
+            (200, 1),
+            (400, 1),
+        ]
+        .into_iter()
+        .map(|(clusters, step)| Profile {
+            flakes: clustered(clusters, step),
+            ..standard
+        })
+        .collect(),
+        Work::BlendNames { .. } | Work::Blend { .. } => {
+            let by = |flakes, method| Profile {
+                flakes,
+                blend: BlendSettings {
+                    method,
+                    ..standard.blend
+                },
+                ..standard
+            };
+            let mut ladder = vec![
+                Profile::draft(),
+                by(clustered(24, 1), Method::Greedy),
+                by(clustered(24, 1), Method::Exact),
+                standard,
+                by(clustered(100, 1), Method::Exact),
+                by(clustered(200, 1), Method::Exact),
+            ];
+            ladder.push(Profile {
+                blend: BlendSettings {
+                    order: Order::Cheapest,
+                    ..standard.blend
+                },
+                ..ladder[5]
+            });
+            ladder
+        }
+        Work::Realise { .. } => [Precision::Eight, Precision::F16, Precision::F32]
+            .into_iter()
+            .map(|precision| Profile {
+                export: ExportSettings {
+                    precision,
+                    ..standard.export
+                },
+                ..standard
+            })
+            .collect(),
+        Work::Preview { .. } => [1, 4, 16, 64, 256, 1024]
+            .into_iter()
+            .map(|samples_per_pixel| Profile {
+                samples_per_pixel,
+                ..standard
+            })
+            .collect(),
+    }
+}
+
+/// Replaces an error that was estimated on some slices by the one of all.
+fn measure_error(
+    work: &Work<'_>,
+    profile: &Profile,
+    estimate: &mut Estimate,
+) -> Result<(), WorkshopError> {
+    match *work {
+        Work::Blend { paints } => {
+            let blend = blend_paints(paints, profile, &|_| ())?.blend;
+            estimate.error.value = blend_error(&blend).lab;
+        }
+        Work::Realise { thing, weights, .. } => {
+            let paint = choose(thing, weights)?.paint;
+            let writing = writing_error(&paint, &profile.export);
+            estimate.error.value = file_error(&error_of(thing, weights), writing.as_ref()).lab;
+        }
+        // Ingest and preview are compared on the very slices and pixels that the result is compared on.
+        Work::Ingest { .. } | Work::BlendNames { .. } | Work::Preview { .. } => {}
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workshop::{EstimatedError, Stage};
+
+    fn estimate(seconds: f64, error: f64) -> Estimate {
+        Estimate {
+            profile: "custom",
+            knobs: Profile::standard(),
+            seconds,
+            stages: vec![Stage {
+                stage: "all",
+                seconds,
+            }],
+            bytes: 0,
+            error: EstimatedError {
+                value: error,
+                unit: "Lab",
+            },
+        }
+    }
+
+    #[test]
+    fn the_cheapest_that_is_accurate_enough_wins_and_the_finest_in_time() {
+        let ladder = || {
+            vec![
+                estimate(1.0, 0.9),
+                estimate(2.0, 0.5),
+                estimate(3.0, 0.2),
+                estimate(4.0, 0.2),
+            ]
+        };
+        let best = |max_error, max_seconds| {
+            let target = Target {
+                max_error,
+                max_seconds,
+            };
+            let best = target.best(ladder()).expect("one of four");
+            (best.seconds, target.is_met(&best))
+        };
+        assert_eq!(best(Some(0.5), None), (2.0, true));
+        assert_eq!(best(Some(0.6), Some(2.5)), (2.0, true));
+        assert_eq!(best(None, Some(3.5)), (3.0, true));
+        assert_eq!(best(None, Some(0.5)), (1.0, false));
+        assert_eq!(best(Some(0.1), None), (3.0, false));
+        assert_eq!(best(Some(0.1), Some(2.0)), (2.0, false));
+    }
+
+    #[test]
+    fn limits_that_are_none_are_refused_by_name() {
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let target = Target {
+                max_seconds: Some(bad),
+                ..Target::default()
+            };
+            let error = target.check().expect_err("refused");
+            assert_eq!(error.field.as_deref(), Some("max_seconds"));
+        }
+    }
+}
