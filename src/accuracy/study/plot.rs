@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{Front, Growth, Study};
 
-const WIDTH: f64 = 820.0;
+const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 480.0;
 /// Left, right, top and bottom of the field that is plotted in.
 const FIELD: [f64; 4] = [78.0, 610.0, 56.0, 412.0];
