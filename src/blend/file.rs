@@ -153,6 +153,7 @@ impl Blend {
             }
             Some(flakes) => Some(read_flakes(flakes, count, &mut reader)?),
         };
+        reader.end()?;
         let blend = Self {
             paints,
             asked: header.asked,

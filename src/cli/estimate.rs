@@ -176,6 +176,7 @@ impl Estimate {
                     size: [size.width, size.height],
                     samples_per_pixel: profile.samples_per_pixel,
                     environment: None,
+                    lights: None,
                 };
                 let work = Work::Preview {
                     thing: &thing,

@@ -94,6 +94,7 @@ impl Preview {
             size: [self.size.width, self.size.height],
             samples_per_pixel: self.spp.unwrap_or(options.profile.samples_per_pixel),
             environment,
+            lights: None,
         };
         let picked = self.profile.pick(&Work::Preview {
             thing: &thing,

@@ -102,7 +102,7 @@ pub enum MeasurementError {
     /// Neither the first bytes nor the length belong to a known layout.
     #[error(
         "the measurement has {bytes} bytes that begin with {begin:02x?}: that is no tensor file, package, MPI 2005 \
-         table (17496000 bytes and a header of 84) or MERL table (34992012 bytes); name its layout: {LAYOUTS}"
+         table (17496000 bytes and a header of 84) or MERL table (34992012 bytes); name its layout (--layout, or layout in a query), accepted are {LAYOUTS}"
     )]
     Unknown {
         /// Length of the input.

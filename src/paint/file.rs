@@ -13,6 +13,9 @@ use crate::color::{Lab, LinearRgb};
 /// Latest version of the file that is read and the one that is written.
 pub const VERSION: u32 = 1;
 
+/// Most characters of a name.
+pub const NAME_CHARACTERS: usize = 200;
+
 /// Where a paint comes from, kept and given back untouched.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -90,6 +93,9 @@ pub enum PaintFileError {
     /// The file as a file.
     #[error(transparent)]
     Container(#[from] ContainerError),
+    /// Its name.
+    #[error("the name in the .paint file has {0} characters, accepted are 1 to {NAME_CHARACTERS}")]
+    Name(usize),
     /// The parameters in it.
     #[error("the .paint file holds no valid paint: {0}")]
     Paint(#[from] PaintError),
@@ -239,6 +245,11 @@ impl PaintFile {
                 texture: flakes.texture,
             }),
         };
+        reader.end()?;
+        let length = header.name.chars().count();
+        if !(1..=NAME_CHARACTERS).contains(&length) {
+            return Err(PaintFileError::Name(length));
+        }
         let (coat, diffuse, lobes) = (physical.coat, physical.diffuse, physical.lobes);
         let paint = CarPaint {
             coat,

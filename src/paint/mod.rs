@@ -38,7 +38,7 @@ pub use color_table::{ColorTable, ColorTableError, at_angles};
 pub use container::{Container, ContainerError, Reader, Writer};
 pub use direction::{ASPECULAR_DEG, Direction, HalfAngles, half_angles, instrument_pairs};
 pub use energy::{EnergyCertificate, certify};
-pub use file::{Clustering, PaintFile, PaintFileError, Provenance};
+pub use file::{Clustering, NAME_CHARACTERS, PaintFile, PaintFileError, Provenance};
 pub use flakes::{FlakeTexture, Flakes, Slice};
 pub use lightness::LightnessMixture;
 pub use limits::Limits;

@@ -5,6 +5,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
 
+use super::visibility::Visibility;
 use crate::store::{CachedResult, Hash};
 
 /// A paint: everything known about it.
@@ -43,6 +44,8 @@ pub struct PaintDocument {
     pub energy: Value,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Whether lists show it.
+    pub visibility: Visibility,
     /// Addresses of what can be made of it.
     #[schema(value_type = Object)]
     pub links: Value,
@@ -84,6 +87,8 @@ pub struct PaintSummary {
     pub name: String,
     /// Kind of source: `package`, `rgl`, `mpi-2005`, `merl`, `sample`, `blend`.
     pub source: String,
+    /// Whether lists show it.
+    pub visibility: Visibility,
     /// BLAKE3 of the physical content.
     pub hash: String,
     /// Where it is.

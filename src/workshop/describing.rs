@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::accuracy::{blend_error, paint_error, sparkle};
-use crate::blend::Blend;
+use crate::blend::{Blend, Order};
 use crate::paint::{ASPECULAR_DEG, Chi, PaintFile, Reflectance, instrument_pairs};
 
 /// Parameters, readings, residuals with their floor, energy certificate, flake statistics and warnings of a paint.
@@ -61,10 +61,8 @@ pub(super) fn describe_correspondence(blend: &Blend) -> Value {
     let names: Vec<&str> = blend.ingredients().map(|(name, _)| name).collect();
     let report = blend.report();
     let told = |places: &[usize]| -> Vec<Value> {
-        let mut asked: Vec<usize> = places.iter().filter_map(|&p| blend.asked_at(p)).collect();
-        asked.sort_unstable();
+        let asked = places.iter().filter_map(|&place| blend.asked_at(place));
         asked
-            .into_iter()
             .map(|k| json!({ "place": k, "name": names[k] }))
             .collect()
     };
@@ -78,11 +76,14 @@ pub(super) fn describe_correspondence(blend: &Blend) -> Value {
     correspondence["mixed"] = told(&report.mixed).into();
     correspondence["without_flakes"] = told(&report.without_flakes).into();
     correspondence["reduced"] = reduced.into();
-    if let Value::Object(fields) = &mut correspondence {
-        // Weights follow the order asked for; the paints are joined in this one.
-        fields
-            .entry("order")
-            .or_insert_with(|| json!("content hash"));
+    // Weights follow the order asked for; the paints are joined in this one.
+    correspondence["order"] = match blend.settings().order {
+        Order::Canonical => "content hash".into(),
+        Order::Cheapest => "cheapest".into(),
+    };
+    correspondence["joined"] = told(&report.order).into();
+    for (k, pair) in report.pairs.iter().enumerate() {
+        correspondence["pairs"][k]["paints"] = told(&pair.paints).into();
     }
     correspondence
 }

@@ -19,7 +19,7 @@ use crate::paint::{
 };
 
 /// Characters a paint's name may have.
-pub const NAME_CHARACTERS: std::ops::RangeInclusive<usize> = 1..=200;
+pub const NAME_CHARACTERS: std::ops::RangeInclusive<usize> = 1..=crate::paint::NAME_CHARACTERS;
 
 /// How a measurement is ingested.
 #[derive(Clone, Debug, Default)]
@@ -104,9 +104,13 @@ pub fn open_measurement(
         ..options.limits
     };
     let bytes = read(path, &held)?;
+    // What is not recognised can be named.
+    let layout = sniff(&bytes, &options.read).map_err(|e| WorkshopError {
+        field: Some("layout".to_owned()),
+        ..wrong(&e)
+    })?;
     let brdf =
         BrdfMeasurement::read(&bytes, &options.read, &options.limits).map_err(|e| wrong(&e))?;
-    let layout = sniff(&bytes, &options.read).map_err(|e| wrong(&e))?;
     let hash = blake3::hash(&bytes);
     Ok(Measurement::Brdf(Box::new(BareMeasurement {
         brdf,

@@ -22,14 +22,16 @@ mod thing;
 pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};
-pub use error::{Fault, WorkshopError};
+pub use error::{Fault, WorkshopError, accepted};
 pub use estimate::{Estimate, EstimatedError, Stage, Work, sample_to_estimate};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{
     BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, ingest, ingest_upload,
     open_measurement,
 };
-pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};
+pub use previewing::{
+    PictureFormat, PreviewLight, PreviewOptions, preview, read_environment, texels,
+};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
 pub use selftest::{Check, selftest};

@@ -176,6 +176,16 @@ pub fn by_name(name: &str) -> Option<&'static Sample> {
 }
 
 impl Sample {
+    /// Everything that its paint is made of, in words: another recipe is another paint.
+    #[must_use]
+    pub fn recipe(&self) -> String {
+        let flakes = self.flakes.map(|sparkle| sparkle.recipe(&self.base()));
+        format!(
+            "{:?}",
+            (self.diffuse, self.weights, self.f0, self.alpha, flakes)
+        )
+    }
+
     /// Whether flakes are simulated for it.
     #[must_use]
     pub const fn is_metallic(&self) -> bool {

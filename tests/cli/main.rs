@@ -596,3 +596,27 @@ fn a_reader_who_has_heard_enough_is_no_error() {
         );
     }
 }
+
+#[test]
+fn the_selftest_says_what_it_found_and_passes_on_samples() {
+    let desk = Desk::new();
+    let output = desk.ok(&["selftest", "sample:white", "--profile", "draft", "--json"]);
+    let report = json(&output.stdout);
+    assert_eq!(report["passed"], true);
+    let checks = report["checks"].as_array().expect("a list");
+    assert!(checks.len() >= 14, "{report}");
+    for check in checks {
+        let (found, limit) = (check["found"].as_f64(), check["limit"].as_f64());
+        assert!(
+            found.expect("a number") <= limit.expect("a number"),
+            "{check}"
+        );
+    }
+    let table = desk
+        .ok(&["selftest", "sample:white", "--profile", "draft"])
+        .stdout;
+    let table = String::from_utf8(table).expect("text");
+    assert_eq!(table.lines().count(), checks.len() + 1, "{table}");
+    assert!(!table.contains("FAILED"));
+    desk.refused(3, &["selftest", "no_such_paint"]);
+}
