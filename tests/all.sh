@@ -15,6 +15,21 @@ if [ ! -d "$CARPAINT_DATA" ]; then
   echo "note: $CARPAINT_DATA is not there; tests on real measurements will skip and say so"
 fi
 
+# The generator of transport problems in CARPAINT_DATA is Python with NumPy.
+if [ -z "${CARPAINT_PYTHON:-}" ] && [ -d "$CARPAINT_DATA" ]; then
+  if python3 -c 'import numpy' 2>/dev/null; then
+    CARPAINT_PYTHON=python3
+  else
+    CARPAINT_PYTHON="$PWD/target/test-python/bin/python"
+    if ! "$CARPAINT_PYTHON" -c 'import numpy' 2>/dev/null; then
+      echo "installing NumPy into target/test-python"
+      python3 -m venv target/test-python
+      "$CARPAINT_PYTHON" -m pip install --quiet --disable-pip-version-check numpy
+    fi
+  fi
+  export CARPAINT_PYTHON
+fi
+
 echo "== Rust: unit, property, oracle, stability and end-to-end tests"
 cargo test --quiet
 

@@ -34,36 +34,60 @@ pub(super) fn common_grid<'a>(
     }
 }
 
-/// Coats blend linearly; an uncoated paint is a coat of index 1, as rough and thick as its partners'.
+/// A coat for every paint: an uncoated one is a coat of index 1, as rough as its partners' mean, and one whose thickness
+/// nobody stated is as thick as theirs. `None` where no paint is coated.
+pub(super) fn coats(paints: &[BlendedPaint]) -> Option<Vec<Coat>> {
+    let known: Vec<Coat> = paints.iter().filter_map(|p| p.coat).collect();
+    let stand_in = Coat {
+        ior: 1.0,
+        roughness: mean(known.iter().map(|c| c.roughness))?,
+        thickness_um: None,
+    };
+    let thickness = mean(known.iter().filter_map(|c| c.thickness_um));
+    let of = |paint: &BlendedPaint| {
+        let coat = paint.coat.unwrap_or(stand_in);
+        Coat {
+            thickness_um: coat.thickness_um.or(thickness),
+            ..coat
+        }
+    };
+    Some(paints.iter().map(of).collect())
+}
+
+/// Coats blend linearly. Paints of weight 0 have no say in whether there is a coat or a thickness at all.
 pub(super) fn coat(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Ledger) -> Option<Coat> {
-    let first = paints.iter().find_map(|p| p.coat)?;
-    let of = |paint: &BlendedPaint| paint.coat.unwrap_or(Coat { ior: 1.0, ..first });
-    let mix = |get: &dyn Fn(Coat) -> f64| {
-        paints
+    let coats = coats(paints)?;
+    let mix = |get: &dyn Fn(&Coat) -> f64| {
+        coats
             .iter()
             .zip(weights)
-            .map(|(p, w)| w * get(of(p)))
+            .map(|(c, w)| w * get(c))
             .sum::<f64>()
     };
+    let taking_part = || {
+        let weighted = paints.iter().zip(weights).filter(|(_, w)| **w != 0.0);
+        weighted.filter_map(|(paint, _)| paint.coat)
+    };
     let ior = ledger.hold("coat.ior", mix(&|c| c.ior), 1.0, 4.0);
-    if ior == 1.0 {
+    // A coat of index 1 reflects and bends nothing, but a paint that has one gets it back.
+    if ior == 1.0 && !taking_part().any(|coat| coat.ior == 1.0) {
         return None;
     }
-    let thick = paints
-        .iter()
-        .all(|p| p.coat.is_none_or(|c| c.thickness_um.is_some()));
+    let stated = taking_part().any(|coat| coat.thickness_um.is_some());
     Some(Coat {
         ior,
         roughness: ledger.hold("coat.roughness", mix(&|c| c.roughness), 0.0, 1.0),
-        thickness_um: thick.then(|| {
-            ledger.hold(
-                "coat.thickness_um",
-                mix(&|c| c.thickness_um.unwrap_or(0.0)),
-                0.0,
-                1e6,
-            )
+        thickness_um: stated.then(|| {
+            let mixed = mix(&|c| c.thickness_um.unwrap_or_default());
+            ledger.hold("coat.thickness_um", mixed, 0.0, 1e6)
         }),
     })
+}
+
+/// Mean of some numbers, `None` of none.
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (count, sum) = values.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
+    (count > 0.0).then(|| sum / count)
 }
 
 /// Diffuse albedo blends linearly.

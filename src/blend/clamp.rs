@@ -1,21 +1,6 @@
 //! What a realisation had to clamp: nothing is clamped silently.
 
-use serde::{Deserialize, Serialize};
-
-/// One bound that bit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Clamp {
-    /// What was clamped.
-    pub field: String,
-    /// What was done.
-    pub bound: String,
-    /// How many numbers.
-    pub count: usize,
-    /// Of how many.
-    pub of: usize,
-    /// How far the worst of them was beyond the bound, in the field's unit.
-    pub worst: f64,
-}
+pub use crate::paint::Clamp;
 
 /// Holds numbers to their bounds and keeps the account.
 #[derive(Debug, Default)]

@@ -228,13 +228,29 @@ fn join_in_order(
         .collect()
 }
 
-/// Grain and lifetime of each paint; one without flakes has those of the first that has.
+/// Grain and lifetime of each paint; one without flakes has the mean of those that have.
 fn textures(paints: &[&CarPaint]) -> Vec<FlakeTexture> {
-    let own = |p: &&CarPaint| p.flakes.as_ref().map(|f| f.texture);
-    let Some(first) = paints.iter().find_map(own) else {
+    let own: Vec<Option<FlakeTexture>> = paints
+        .iter()
+        .map(|p| p.flakes.as_ref().map(|f| f.texture))
+        .collect();
+    let known: Vec<&FlakeTexture> = own.iter().flatten().collect();
+    if known.is_empty() {
         return Vec::new();
+    }
+    let mean = |get: &dyn Fn(&FlakeTexture) -> f64| {
+        known.iter().map(|t| get(t)).sum::<f64>() / known.len() as f64
     };
-    paints.iter().map(|p| own(p).unwrap_or(first)).collect()
+    let stand_in = FlakeTexture {
+        texel_um: mean(&|t| t.texel_um),
+        grain_um: mean(&|t| t.grain_um),
+        lifetime_deg: [mean(&|t| t.lifetime_deg[0]), mean(&|t| t.lifetime_deg[1])],
+        persistence_deg: [
+            mean(&|t| t.persistence_deg[0]),
+            mean(&|t| t.persistence_deg[1]),
+        ],
+    };
+    own.into_iter().map(|t| t.unwrap_or(stand_in)).collect()
 }
 
 fn blend_slice(

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Blend, BlendSettings, BlendedFlakes, BlendedPaint, Boxes, CorrespondenceReport, PAINTS,
+    Blend, BlendSettings, BlendedFlakes, BlendedPaint, Boxes, CorrespondenceReport, Origin, PAINTS,
 };
 use crate::color::{Lab, LinearRgb};
 use crate::paint::{
@@ -53,6 +53,8 @@ struct PaintHeader {
     diffuse: LinearRgb,
     lobes: Vec<Lobe>,
     chi_overall: Lab,
+    #[serde(default, skip_serializing_if = "Origin::is_plain")]
+    origin: Origin,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     clustering: Option<Clustering>,
 }
@@ -151,6 +153,7 @@ impl Blend {
             }
             Some(flakes) => Some(read_flakes(flakes, count, &mut reader)?),
         };
+        reader.end()?;
         let blend = Self {
             paints,
             asked: header.asked,
@@ -232,6 +235,7 @@ impl PaintHeader {
             diffuse: paint.diffuse,
             lobes: paint.lobes.clone(),
             chi_overall: paint.color_table.overall(),
+            origin: paint.origin,
             clustering: paint.clustering.clone(),
         }
     }
@@ -243,6 +247,7 @@ impl PaintHeader {
             coat,
             diffuse,
             lobes,
+            origin,
             clustering,
             ..
         } = self;
@@ -253,6 +258,7 @@ impl PaintHeader {
             diffuse,
             lobes,
             color_table,
+            origin,
             clustering,
         }
     }

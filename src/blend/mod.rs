@@ -11,13 +11,16 @@
 //! Left to others: solving a transport problem (`transport`), reducing clusters of a paint that has too many (`fit`).
 
 mod base;
+mod boxes;
 mod clamp;
 mod correspondence;
 mod file;
 mod lobes;
 mod mixture;
 mod order;
+mod origin;
 mod pairs;
+mod parts;
 mod realise;
 mod thinned;
 mod weights;
@@ -26,7 +29,9 @@ pub use clamp::Clamp;
 pub use correspondence::{BlendDeviation, BlendSettings, CorrespondenceReport};
 pub use file::BlendFileError;
 pub use order::Order;
+pub use origin::{Origin, Reduction};
 pub use pairs::PairReport;
+pub(crate) use parts::Part;
 pub use realise::Realised;
 pub use weights::{RealisationWeights, WeightError};
 
@@ -68,6 +73,7 @@ pub(crate) struct BlendedPaint {
     pub diffuse: [f64; 3],
     pub lobes: Vec<Lobe>,
     pub color_table: ColorTable,
+    pub origin: Origin,
     /// How its flakes were clustered, where that is known.
     pub clustering: Option<Clustering>,
 }
@@ -173,6 +179,7 @@ impl Blend {
                     diffuse: paint.diffuse,
                     lobes: paint.lobes.clone(),
                     color_table: paint.color_table.on(&chi_h, &chi_d),
+                    origin: Origin::default(),
                     clustering: None,
                 }
             })
@@ -216,6 +223,26 @@ impl Blend {
         self.asked
             .iter()
             .map(|&k| (self.paints[k].name.as_str(), self.paints[k].hash.as_str()))
+    }
+
+    /// The same blend with what is known of its paints, in the order asked for.
+    #[must_use]
+    pub fn with_origins(mut self, origins: impl IntoIterator<Item = Origin>) -> Self {
+        for (&place, origin) in self.asked.iter().zip(origins) {
+            self.paints[place].origin = origin;
+        }
+        self
+    }
+
+    /// What is known of each paint, in the order asked for.
+    pub fn origins(&self) -> impl Iterator<Item = Origin> + Clone {
+        self.asked.iter().map(|&place| self.paints[place].origin)
+    }
+
+    /// Which paint in the order asked for stands at this place in the order of content hashes.
+    #[must_use]
+    pub fn asked_at(&self, place: usize) -> Option<usize> {
+        self.asked.iter().position(|&own| own == place)
     }
 
     /// Place in hash order of the paint that was asked for `k`-th.

@@ -5,15 +5,15 @@
 //! ```
 //!
 //! with one set of weights for the lightness of the boxes and one for their a and b; probabilities never change
-//! (Golla and Klein 2018, eq. 14-15, 4.4). Weights may leave 0..1 and need not sum to 1. A box that turns inside out by
-//! extrapolation gets its corners ordered again; boxes are not clamped to `L >= 0`, because the light they stand for is
-//! clamped once, when it is evaluated.
+//! (Golla and Klein 2018, eq. 14-15, 4.4). Weights may leave 0..1 and need not sum to 1. The sums themselves stand in
+//! `boxes`; base and lobes have their own files.
 
 use serde::{Deserialize, Serialize};
 
+use super::boxes::{Mixed, mix_boxes};
 use super::clamp::{Clamp, Ledger};
 use super::{Blend, BlendedFlakes, RealisationWeights, WeightError, base, lobes};
-use crate::paint::{CarPaint, FlakeTexture, Flakes, MAX_LAB};
+use crate::paint::{CarPaint, FlakeTexture, Flakes};
 
 /// A synthesised paint and the account of what had to be clamped.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,13 +49,7 @@ impl Blend {
         let lightness = by_hash(wanted.flake_lightness());
         let color = by_hash(wanted.flake_color());
         let mut ledger = Ledger::default();
-        let places = lobes::matched(
-            &self
-                .paints
-                .iter()
-                .map(|p| p.lobes.as_slice())
-                .collect::<Vec<_>>(),
-        );
+        let places = self.matched_lobes();
         let paint = CarPaint {
             coat: base::coat(&self.paints, &base_weights, &mut ledger),
             diffuse: base::diffuse(&self.paints, &base_weights, &mut ledger),
@@ -84,49 +78,17 @@ impl BlendedFlakes {
         saturation: f64,
         ledger: &mut Ledger,
     ) -> Flakes {
-        let count = self.probability.len();
         let axes: Vec<[f64; 3]> = lightness
             .iter()
             .zip(color)
             .map(|(&l, &c)| [l, c * saturation, c * saturation])
             .collect();
-        let (mut lower, mut upper) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        let (mut inverted, mut narrowest) = (0, 0.0_f64);
-        let (mut beyond, mut furthest) = (0, 0.0_f64);
-        for k in 0..count {
-            let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
-            for (own, weights) in self.boxes.iter().zip(&axes) {
-                for axis in 0..3 {
-                    low[axis] += weights[axis] * f64::from(own.lower[k][axis]);
-                    high[axis] += weights[axis] * f64::from(own.upper[k][axis]);
-                }
-            }
-            for axis in 0..3 {
-                let width = high[axis] - low[axis];
-                inverted += usize::from(width < 0.0);
-                narrowest = narrowest.min(width);
-                (low[axis], high[axis]) = (low[axis].min(high[axis]), low[axis].max(high[axis]));
-                let reach = high[axis].max(-low[axis]) - MAX_LAB;
-                beyond += usize::from(reach > 0.0);
-                furthest = furthest.max(reach);
-            }
-            lower.push(low.map(held));
-            upper.push(high.map(held));
-        }
-        ledger.record(
-            "flakes.boxes",
-            "inverted corners put in order",
-            inverted,
-            3 * count,
-            -narrowest,
-        );
-        ledger.record(
-            "flakes.boxes",
-            "Lab held to -2000..2000",
-            beyond,
-            3 * count,
-            furthest,
-        );
+        let Mixed {
+            lower,
+            upper,
+            account,
+        } = mix_boxes(&self.boxes, &axes);
+        account.close(3 * self.probability.len(), ledger);
         Flakes {
             theta_h: self.theta_h.clone(),
             theta_d: self.theta_d.clone(),
@@ -165,9 +127,4 @@ impl BlendedFlakes {
             persistence_deg,
         }
     }
-}
-
-#[allow(clippy::cast_possible_truncation)] // boxes are kept at texel precision
-fn held(value: f64) -> f32 {
-    value.clamp(-MAX_LAB, MAX_LAB) as f32
 }

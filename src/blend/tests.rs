@@ -397,7 +397,7 @@ fn a_file_gives_the_blend_back() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
     /// Every box corner moves linearly, so no realisation is further from its neighbour than the weights' step times
     /// the sum of the largest corners.
     #[test]

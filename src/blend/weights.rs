@@ -78,7 +78,9 @@ impl RealisationWeights {
         }
     }
 
-    pub(super) fn base(&self) -> &[f64] {
+    /// Weights of the base.
+    #[must_use]
+    pub fn base(&self) -> &[f64] {
         self.base.as_deref().unwrap_or(&self.weights)
     }
 

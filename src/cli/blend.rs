@@ -11,7 +11,8 @@ use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
 use crate::accuracy::blend_error;
-use crate::workshop::{Work, WorkshopError, blend_paints, open_paint};
+use crate::blend::PAINTS;
+use crate::workshop::{Work, WorkshopError, blend_paints, describe_blend, open_paint};
 
 /// Find how the flakes of 2 to 5 paints become one another, and keep it as a .blend.
 ///
@@ -34,6 +35,15 @@ pub struct Blend {
 impl Blend {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
         let mut options = ReadingArgs::default().options(None, &self.profile)?;
+        if !PAINTS.contains(&self.inputs.len()) {
+            let problem = format!(
+                "{} paints given, a blend takes {} to {}",
+                self.inputs.len(),
+                PAINTS.start(),
+                PAINTS.end()
+            );
+            return Err(WorkshopError::usage("INPUT", problem));
+        }
         let picked = self.profile.pick(&Work::BlendNames {
             names: &self.inputs,
             options: &options,
@@ -44,7 +54,7 @@ impl Blend {
         let start = Instant::now();
         let mut paints = Vec::with_capacity(self.inputs.len());
         for input in &self.inputs {
-            let progress = Progress::new(&format!("reading {input}"));
+            let progress = Progress::reading(input);
             paints.push(open_paint(input, &options, &|share| progress.at(share))?);
         }
         let read = start.elapsed();
@@ -67,12 +77,13 @@ impl Blend {
             });
             output::replace(timings, seconds.to_string().as_bytes())?;
         }
-        let report = made.blend.report();
+        let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
         if json {
-            let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
+            let correspondence = &describe_blend(&made.blend)["correspondence"];
             return output::print_json(
-                &json!({ "out": self.out, "paints": names, "profile": options.profile.name(), "correspondence": report,
-                    "error": blend_error(&made.blend), "picked": picked, "notes": made.notes }),
+                &json!({ "out": self.out, "paints": names, "profile": options.profile.name(),
+                    "correspondence": correspondence, "error": blend_error(&made.blend), "picked": picked,
+                    "notes": made.notes }),
             );
         }
         if let Some(picked) = &picked {
@@ -81,7 +92,7 @@ impl Blend {
         for note in &made.notes {
             eprintln!("note: {note}");
         }
-        let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
+        let report = made.blend.report();
         eprintln!(
             "{}: {} · {} slices, {} clusters, mean transport {:.2}, error {:.3} Lab",
             self.out.display(),

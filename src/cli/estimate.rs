@@ -10,12 +10,10 @@ use super::ingest::ReadingArgs;
 use super::output;
 use super::preview::Size;
 use super::profile::ProfileArgs;
-use super::realise::refuse_weights;
 use super::weights::WeightArgs;
-use crate::blend::RealisationWeights;
 use crate::workshop::{
-    Estimate as Estimated, Format, IngestOptions, PictureFormat, PreviewOptions, Stage, Thing,
-    Work, WorkshopError, open, sample_to_estimate,
+    Estimate as Estimated, Format, IngestOptions, PictureFormat, PreviewOptions, Stage, Work,
+    WorkshopError, open, sample_to_estimate,
 };
 
 /// Estimate seconds, bytes and error of a command before running it.
@@ -146,7 +144,7 @@ impl Estimate {
                 let begun = Instant::now();
                 let thing = open(input, options, &|_| ())?;
                 let opened = opening(begun);
-                let weights = chosen(&thing, weights)?;
+                let weights = weights.for_thing(&thing)?;
                 let format = match format {
                     FormatName::Zip => Format::Zip,
                     FormatName::Glb => Format::Glb,
@@ -170,7 +168,7 @@ impl Estimate {
                 ..
             } => {
                 let (opened, thing) = sample_to_estimate(input, options)?;
-                let weights = chosen(&thing, weights)?;
+                let weights = weights.for_thing(&thing)?;
                 let mut profile = options.profile;
                 profile.samples_per_pixel = spp.unwrap_or(profile.samples_per_pixel);
                 let view = PreviewOptions {
@@ -178,6 +176,7 @@ impl Estimate {
                     size: [size.width, size.height],
                     samples_per_pixel: profile.samples_per_pixel,
                     environment: None,
+                    lights: None,
                 };
                 let work = Work::Preview {
                     thing: &thing,
@@ -218,17 +217,5 @@ fn opening(begun: Instant) -> Stage {
     Stage {
         stage: "open",
         seconds: begun.elapsed().as_secs_f64(),
-    }
-}
-
-fn chosen(
-    thing: &Thing,
-    weights: &WeightArgs,
-) -> Result<Option<RealisationWeights>, WorkshopError> {
-    match thing {
-        Thing::Paint(_) => refuse_weights(weights).map(|()| None),
-        Thing::Blend(blend) => weights
-            .for_blend(blend.ingredients().map(|(name, _)| name))
-            .map(Some),
     }
 }

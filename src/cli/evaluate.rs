@@ -8,11 +8,11 @@ use serde_json::json;
 use super::ingest::ReadingArgs;
 use super::output;
 use super::profile::ProfileArgs;
-use super::realise::refuse_weights;
+use super::progress::Progress;
 use super::weights::WeightArgs;
 use crate::paint::Chi;
 use crate::workshop::{
-    Pairs, Source, Thing, WorkshopError, evaluate, evaluate_raw, find, open, open_measurement, read,
+    Pairs, Source, WorkshopError, evaluate, evaluate_raw, find, open, open_measurement, read,
 };
 
 /// Evaluate the BRDF at pairs of directions: 1/sr, linear sRGB, flakes at their mean, no cosine.
@@ -54,7 +54,7 @@ impl Evaluate {
             &options.limits,
         )?;
         let values = if self.raw {
-            refuse_weights(&self.weights)?;
+            self.weights.refuse()?;
             let Source::Path(path) = find(&self.input)? else {
                 return Err(WorkshopError::input(
                     &self.input,
@@ -68,15 +68,11 @@ impl Evaluate {
             } else {
                 Chi::Table
             };
-            let thing = open(&self.input, &options, &|_| ())?;
-            if matches!(thing, Thing::Paint(_)) {
-                refuse_weights(&self.weights)?;
-            }
-            let realised = thing.realise(|blend| {
-                self.weights
-                    .for_blend(blend.ingredients().map(|(name, _)| name))
-                    .map(Some)
-            })?;
+            let progress = Progress::reading(&self.input);
+            let thing = open(&self.input, &options, &|share| progress.at(share))?;
+            drop(progress);
+            let weights = self.weights.for_thing(&thing)?;
+            let realised = thing.realise(weights.as_ref())?;
             evaluate(&realised.paint, &pairs, chi)
         };
         let mut bytes = serde_json::to_vec(&values).map_err(WorkshopError::internal)?;

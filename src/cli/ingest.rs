@@ -42,7 +42,7 @@ pub struct ReadingArgs {
     #[arg(long, value_enum, value_name = "SPACING")]
     theta_h: Option<SpacingName>,
     /// Bytes before the values of an MPI 2005 table, 84 unless given.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1 << 20))]
     header_bytes: Option<u64>,
     /// Give the paint a clear coat of this index of refraction, 1 to 4; otherwise the fit decides.
     #[arg(long, value_name = "N")]

@@ -4,6 +4,7 @@
 //! a bug; `--json` prints one object on stdout; progress and errors go to stderr; files appear whole or not at all.
 
 mod blend;
+mod bundle;
 mod estimate;
 mod evaluate;
 mod ingest;
@@ -13,6 +14,7 @@ mod profile;
 mod progress;
 mod realise;
 mod samples;
+mod selftest;
 mod serve;
 mod show;
 mod study;
@@ -41,14 +43,8 @@ struct Common {
     /// Print one JSON object on stdout; progress and errors stay on stderr.
     #[arg(long, global = true)]
     json: bool,
-    /// Threads to compute with. Results are the same with any number.
-    #[arg(
-        long,
-        global = true,
-        value_name = "N",
-        env = "RAYON_NUM_THREADS",
-        hide_env = true
-    )]
+    /// Threads to compute with, in place of RAYON_NUM_THREADS, in place of all. Results are the same with any number.
+    #[arg(long, global = true, value_name = "N")]
     threads: Option<usize>,
 }
 
@@ -59,12 +55,14 @@ enum Command {
     Show(show::Show),
     Blend(blend::Blend),
     Realise(realise::Realise),
+    Bundle(bundle::Bundle),
     Preview(preview::Preview),
     Texels(texels::Texels),
     Evaluate(evaluate::Evaluate),
     Estimate(estimate::Estimate),
     Study(study::Study),
     Samples(samples::Samples),
+    Selftest(selftest::Selftest),
 }
 
 const EXAMPLES: &str = "\
@@ -72,6 +70,7 @@ Examples:
   carpaint blend sample:polaris_silber sample:ford_f8 --out two.blend
   carpaint preview two.blend --weights 0.5,0.5 --out between.png
   carpaint realise two.blend --weights 0.5,0.5 --out between.zip
+  carpaint bundle two.blend --out sliders.zip
   carpaint serve";
 
 /// Runs the command line of this process.
@@ -100,6 +99,7 @@ fn start(cli: Cli) -> Result<(), WorkshopError> {
         ));
     }
     rayon::ThreadPoolBuilder::new()
+        // 0 leaves it to rayon, which reads RAYON_NUM_THREADS, where 0 and nothing mean all.
         .num_threads(cli.common.threads.unwrap_or(0))
         .build_global()
         .map_err(WorkshopError::internal)?;
@@ -110,12 +110,14 @@ fn start(cli: Cli) -> Result<(), WorkshopError> {
         Command::Show(command) => command.run(json),
         Command::Blend(command) => command.run(json),
         Command::Realise(command) => command.run(json),
+        Command::Bundle(command) => command.run(json),
         Command::Preview(command) => command.run(json),
         Command::Texels(command) => command.run(json),
         Command::Evaluate(command) => command.run(json),
         Command::Estimate(command) => command.run(json),
         Command::Study(command) => command.run(json),
         Command::Samples(command) => command.run(json),
+        Command::Selftest(command) => command.run(json),
     }
 }
 

@@ -11,10 +11,9 @@ use super::ingest::ReadingArgs;
 use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
-use super::realise::refuse_weights;
 use super::weights::WeightArgs;
 use crate::workshop::{
-    PictureFormat, PreviewOptions, Thing, Work, WorkshopError, open, preview, read_environment,
+    PictureFormat, PreviewOptions, Work, WorkshopError, open, preview, read_environment,
 };
 
 /// Draw a paint, a blend at given weights, or a sample.
@@ -81,14 +80,10 @@ impl Preview {
         let options = ReadingArgs::default().options(None, &self.profile)?;
         let format = PictureFormat::of_path(&self.out)?;
         let start = Instant::now();
-        let thing = open(&self.input, &options, &|_| ())?;
-        let weights = match &thing {
-            Thing::Paint(_) => refuse_weights(&self.weights).map(|()| None)?,
-            Thing::Blend(blend) => Some(
-                self.weights
-                    .for_blend(blend.ingredients().map(|(name, _)| name))?,
-            ),
-        };
+        let progress = Progress::reading(&self.input);
+        let thing = open(&self.input, &options, &|share| progress.at(share))?;
+        drop(progress);
+        let weights = self.weights.for_thing(&thing)?;
         let environment = self
             .environment
             .as_deref()
@@ -99,6 +94,7 @@ impl Preview {
             size: [self.size.width, self.size.height],
             samples_per_pixel: self.spp.unwrap_or(options.profile.samples_per_pixel),
             environment,
+            lights: None,
         };
         let picked = self.profile.pick(&Work::Preview {
             thing: &thing,

@@ -24,6 +24,11 @@ impl Progress {
         Self { bar }
     }
 
+    /// A bar for reading an input, which for a measurement is a fit.
+    pub fn reading(input: &str) -> Self {
+        Self::new(&format!("reading {input}"))
+    }
+
     /// Says what is being done now.
     pub fn says(&self, what: &str) {
         self.bar.set_message(what.to_owned());

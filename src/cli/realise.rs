@@ -9,8 +9,9 @@ use serde_json::json;
 use super::ingest::ReadingArgs;
 use super::output;
 use super::profile::ProfileArgs;
+use super::progress::Progress;
 use super::weights::WeightArgs;
-use crate::workshop::{Format, Thing, Work, WorkshopError, open, realise};
+use crate::workshop::{Format, Work, WorkshopError, open, realise};
 
 /// Take a realisation of a blend: a texture bundle, a GLB, a material.json, or a .paint.
 ///
@@ -37,14 +38,10 @@ impl Realise {
         let start = Instant::now();
         let mut options = ReadingArgs::default().options(None, &self.profile)?;
         let format = Format::of_path(&self.out)?;
-        let thing = open(&self.input, &options, &|_| ())?;
-        let weights = match &thing {
-            Thing::Paint(_) => refuse_weights(&self.weights).map(|()| None)?,
-            Thing::Blend(blend) => Some(
-                self.weights
-                    .for_blend(blend.ingredients().map(|(name, _)| name))?,
-            ),
-        };
+        let progress = Progress::reading(&self.input);
+        let thing = open(&self.input, &options, &|share| progress.at(share))?;
+        drop(progress);
+        let weights = self.weights.for_thing(&thing)?;
         let picked = self.profile.pick(&Work::Realise {
             thing: &thing,
             weights: weights.as_ref(),
@@ -82,15 +79,4 @@ impl Realise {
         eprintln!("{}: {} bytes", self.out.display(), made.bytes.len());
         Ok(())
     }
-}
-
-/// One paint takes no weights: asking for some is a mistake worth telling.
-pub fn refuse_weights(weights: &WeightArgs) -> Result<(), WorkshopError> {
-    if weights.is_empty() {
-        return Ok(());
-    }
-    Err(WorkshopError::usage(
-        "--weights",
-        "this is one paint, weights are for a .blend: leave them out",
-    ))
 }

@@ -73,9 +73,11 @@ fn list(json: bool) -> Result<(), WorkshopError> {
             &json!({ "samples": samples, "source": "Günther et al., VMV 2005" }),
         );
     }
-    for sample in &SAMPLES {
-        println!("sample:{:<16} {}", sample.name, sample.about);
-    }
-    println!("Bases: fits of Günther et al., VMV 2005; the flakes are simulated.");
-    Ok(())
+    let lines = SAMPLES
+        .iter()
+        .map(|sample| format!("sample:{:<16} {}\n", sample.name, sample.about));
+    let text: String = lines.collect();
+    output::print(&format!(
+        "{text}Bases: fits of Günther et al., VMV 2005; the flakes are simulated.\n"
+    ))
 }

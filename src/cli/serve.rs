@@ -6,9 +6,10 @@ use std::sync::Arc;
 
 use clap::Args;
 use tokio::net::TcpListener;
+use tokio::sync::Notify;
 
 use crate::paint::Limits;
-use crate::service::{self, ServeError, ServiceConfig, Workshop};
+use crate::service::{self, App, ServeError, ServiceConfig, Workshop};
 use crate::workshop::WorkshopError;
 
 /// Serve paints over HTTP, with the sample paints loaded.
@@ -63,22 +64,57 @@ impl Serve {
         let app = service::open(config, Arc::new(Workshop::new(Limits::default())))
             .await
             .map_err(refused)?;
-        if !self.no_samples {
+        // Requests are answered while the samples load, /readyz says when they have.
+        let failed = Arc::new(Notify::new());
+        let loading = tokio::spawn(load(
+            app.clone(),
+            self.no_samples,
+            json,
+            address,
+            Arc::clone(&failed),
+        ));
+        let stop = async {
+            tokio::select! {
+                () = stop_asked() => {}
+                () = failed.notified() => {}
+            }
+        };
+        service::serve(app, listener, stop).await;
+        if loading.is_finished() {
+            return loading.await.map_err(WorkshopError::internal)?;
+        }
+        Ok(())
+    }
+}
+
+/// Loads the samples and says that the service is ready; where that fails the service ends.
+async fn load(
+    app: App,
+    no_samples: bool,
+    json: bool,
+    address: SocketAddr,
+    failed: Arc<Notify>,
+) -> Result<(), WorkshopError> {
+    let loaded = async {
+        if !no_samples {
             service::load_samples(&app)
                 .await
                 .map_err(|_| WorkshopError::internal("the sample paints could not be loaded"))?;
         }
         app.set_ready();
         if json {
-            super::output::print_json(
-                &serde_json::json!({ "listening": format!("http://{address}") }),
-            )?;
+            let told = serde_json::json!({ "listening": format!("http://{address}") });
+            super::output::print_json(&told)
         } else {
             eprintln!("carpaint is ready: open http://{address}");
+            Ok(())
         }
-        service::serve(app, listener, stop_asked()).await;
-        Ok(())
+    };
+    let loaded = loaded.await;
+    if loaded.is_err() {
+        failed.notify_one();
     }
+    loaded
 }
 
 /// Returns on Ctrl-C or SIGTERM.

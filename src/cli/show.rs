@@ -6,6 +6,7 @@ use serde_json::Value;
 use super::ingest::ReadingArgs;
 use super::output;
 use super::profile::ProfileArgs;
+use super::progress::Progress;
 use crate::paint::PaintFile;
 use crate::workshop::{Thing, WorkshopError, describe_blend, describe_paint, open};
 
@@ -22,15 +23,19 @@ pub struct Show {
 impl Show {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
         let options = ReadingArgs::default().options(None, &self.profile)?;
-        let about = match open(&self.input, &options, &|_| ())? {
+        let progress = Progress::reading(&self.input);
+        let thing = open(&self.input, &options, &|share| progress.at(share))?;
+        drop(progress);
+        let about = match thing {
             Thing::Paint(paint) => describe_paint(&paint),
             Thing::Blend(blend) => describe_blend(&blend),
         };
         if json {
             return output::print_json(&about);
         }
-        print_tree(&about, 0);
-        Ok(())
+        let mut text = String::new();
+        tree(&about, 0, &mut text);
+        output::print(&text)
     }
 }
 
@@ -65,31 +70,24 @@ pub fn one_line(paint: &PaintFile) -> String {
     parts.join(" · ")
 }
 
-/// Prints nested values as an indented list; short lists of numbers stay on one line.
-fn print_tree(value: &Value, depth: usize) {
+/// Nested values as an indented list; short lists of numbers stay on one line.
+fn tree(value: &Value, depth: usize, text: &mut String) {
     let pad = "  ".repeat(depth);
-    match value {
-        Value::Object(map) => {
-            for (key, value) in map {
-                if let Some(text) = inline(value) {
-                    println!("{pad}{key}: {text}");
-                } else {
-                    println!("{pad}{key}:");
-                    print_tree(value, depth + 1);
-                }
-            }
+    let entries: Vec<(String, &Value)> = match value {
+        Value::Object(map) => map.iter().map(|(key, v)| (format!("{key}:"), v)).collect(),
+        Value::Array(list) => list.iter().map(|v| ("-".to_owned(), v)).collect(),
+        other => {
+            *text += &format!("{pad}{}\n", inline(other).unwrap_or_default());
+            return;
         }
-        Value::Array(list) => {
-            for value in list {
-                if let Some(text) = inline(value) {
-                    println!("{pad}- {text}");
-                } else {
-                    println!("{pad}-");
-                    print_tree(value, depth + 1);
-                }
-            }
+    };
+    for (key, value) in entries {
+        if let Some(line) = inline(value) {
+            *text += &format!("{pad}{key} {line}\n");
+        } else {
+            *text += &format!("{pad}{key}\n");
+            tree(value, depth + 1, text);
         }
-        other => println!("{pad}{}", inline(other).unwrap_or_default()),
     }
 }
 

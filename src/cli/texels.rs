@@ -9,9 +9,9 @@ use super::ingest::ReadingArgs;
 use super::output;
 use super::preview::Size;
 use super::profile::ProfileArgs;
-use super::realise::refuse_weights;
+use super::progress::Progress;
 use super::weights::WeightArgs;
-use crate::workshop::{Thing, WorkshopError, open, texels};
+use crate::workshop::{WorkshopError, open, texels};
 
 /// Write the flakes at one angle pair as an EXR: 1/sr, linear sRGB, one pixel a texel.
 #[derive(Args, Clone, Debug)]
@@ -51,15 +51,11 @@ impl Texels {
             }
         }
         let options = ReadingArgs::default().options(None, &self.profile)?;
-        let thing = open(&self.input, &options, &|_| ())?;
-        if matches!(thing, Thing::Paint(_)) {
-            refuse_weights(&self.weights)?;
-        }
-        let realised = thing.realise(|blend| {
-            self.weights
-                .for_blend(blend.ingredients().map(|(name, _)| name))
-                .map(Some)
-        })?;
+        let progress = Progress::reading(&self.input);
+        let thing = open(&self.input, &options, &|share| progress.at(share))?;
+        drop(progress);
+        let weights = self.weights.for_thing(&thing)?;
+        let realised = thing.realise(weights.as_ref())?;
         let (angles, size) = (
             [self.theta_h, self.theta_d],
             [self.size.width, self.size.height],

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use clap::Args;
 
 use crate::blend::RealisationWeights;
-use crate::workshop::WorkshopError;
+use crate::workshop::{Thing, WorkshopError};
 
 /// Numbers separated by commas.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +49,7 @@ pub struct WeightArgs {
 
 impl WeightArgs {
     /// Whether nothing was given.
-    pub fn is_empty(&self) -> bool {
+    fn is_empty(&self) -> bool {
         self.weights.is_none()
             && self.base.is_none()
             && self.flake_lightness.is_none()
@@ -57,12 +57,40 @@ impl WeightArgs {
             && self.flake_saturation.is_none()
     }
 
+    /// The weights that this thing needs: a blend needs some, one paint takes none.
+    pub fn for_thing(&self, thing: &Thing) -> Result<Option<RealisationWeights>, WorkshopError> {
+        match thing {
+            Thing::Paint(_) => self.refuse().map(|()| None),
+            Thing::Blend(blend) => self
+                .for_blend(blend.ingredients().map(|(name, _)| name))
+                .map(Some),
+        }
+    }
+
+    /// One paint takes no weights: asking for some is a mistake worth telling.
+    pub fn refuse(&self) -> Result<(), WorkshopError> {
+        if self.is_empty() {
+            return Ok(());
+        }
+        Err(WorkshopError::usage(
+            "--weights",
+            "this is one paint, weights are for a .blend: leave them out",
+        ))
+    }
+
     /// The weights for a blend of the named paints.
-    pub fn for_blend<'a>(
+    fn for_blend<'a>(
         &self,
         names: impl Iterator<Item = &'a str>,
     ) -> Result<RealisationWeights, WorkshopError> {
-        let Some(weights) = &self.weights else {
+        let own = |list: &Option<WeightList>| list.as_ref().map(|w| w.0.clone());
+        let parts = [&self.base, &self.flake_lightness, &self.flake_color];
+        // Where all that weights are for have weights of their own, none are missing.
+        let all = self.weights.as_ref().or_else(|| {
+            let has_all = parts.iter().all(|part| part.is_some());
+            self.base.as_ref().filter(|_| has_all)
+        });
+        let Some(weights) = all else {
             let names: Vec<&str> = names.collect();
             let problem = format!(
                 "a blend needs --weights: {} numbers separated by commas, for {}",
@@ -71,7 +99,6 @@ impl WeightArgs {
             );
             return Err(WorkshopError::usage("--weights", problem));
         };
-        let own = |list: &Option<WeightList>| list.as_ref().map(|w| w.0.clone());
         Ok(RealisationWeights {
             weights: weights.0.clone(),
             base: own(&self.base),

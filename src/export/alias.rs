@@ -115,6 +115,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn every_cluster_is_drawn_as_often_as_it_is_probable(
             weights in prop::collection::vec(prop_oneof![Just(0.0), 1e-12..1.0_f64, 0.9..1.0_f64], 1..150),

@@ -34,6 +34,11 @@ pub fn bundle(
 ) -> Result<Vec<u8>, ExportError> {
     let textures = Textures::of(paint, settings)?;
     let json = document(paint, about, settings, &textures, &Carrier::Files)?;
+    archive(&json, &textures)
+}
+
+/// The archive of a document, its textures, and the files that are the same in every bundle.
+pub(super) fn archive(json: &[u8], textures: &Textures) -> Result<Vec<u8>, ExportError> {
     let size: usize =
         textures.list.iter().map(|t| t.bytes.len()).sum::<usize>() + json.len() + (64 << 10);
     let mut zip = ZipWriter::new(Cursor::new(Vec::with_capacity(size)));
@@ -44,7 +49,7 @@ pub fn bundle(
         zip.start_file(name, options)?;
         Ok(zip.write_all(bytes)?)
     };
-    entry("material.json", &json)?;
+    entry("material.json", json)?;
     for texture in &textures.list {
         entry(&texture.file, &texture.bytes)?;
     }
@@ -55,15 +60,14 @@ pub fn bundle(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
-    use crate::export::document::tests::assert_documented;
     use crate::export::made_up::{about, metallic};
-    use crate::export::{Precision, material_json};
+    use crate::export::{Precision, assert_documented, material_json};
     use serde_json::Value;
     use std::io::Read;
 
-    fn files(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
+    pub(in crate::export) fn files(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
         let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).expect("an archive");
         (0..archive.len())
             .map(|k| {

@@ -1,21 +1,24 @@
 //! `material.json`: every number of a paint that is not a texel, with its unit and range beside it.
 
 use serde::Serialize;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
 use super::clamp::Clamped;
 use super::textures::{Entry, Textures};
-use super::{About, ExportError, ExportSettings, inverse_cdf};
+use super::{About, ExportError, ExportSettings, inverse_cdf, numbers};
 use crate::paint::{CarPaint, Lobe, Provenance, RandomTexture, cell_spacing};
 
 /// Version of the document's form.
 const VERSION: u32 = 1;
 
-const MODEL: &str = "f(x,i,o) = T(i) T(o) [ chi(theta_h,theta_d) (diffuse/pi + sum of lobes) + flakes(x,theta_h,theta_d) ] + highlight; \
+pub(super) const MODEL: &str = "f(x,i,o) = T(i) T(o) [ chi(theta_h,theta_d) (diffuse/pi + sum of lobes) + flakes(x,theta_h,theta_d) ] + highlight; \
      angles inside the coat; chi and flakes bilinear between their angles, border values outside; f is clamped at 0 once, at \
      the end; 0 at and below the horizon. Lobe: weight D F G / (pi i_z o_z), D = exp(-tan^2 theta_h/alpha^2)/(alpha^2 cos^4 theta_h), \
      F = F0 + (1-F0)(1-h.o)^5, G = min(1, 2 h_z o_z/(h.o), 2 h_z i_z/(h.o)). T = 1 - R, R exact unpolarised Fresnel at the outer cosine. \
      Highlight: D/(pi) G R(h.i) / (4 i_z o_z) with h outside the coat and alpha its roughness; below 0.001 a mirror image of weight R.";
+
+pub(super) const COLOR_SPACE: &str =
+    "linear sRGB, D65; CIELAB of pi f relative to the perfect diffuser, D65, 2 degree observer";
 
 #[derive(Serialize)]
 pub(super) struct Document<'a> {
@@ -98,16 +101,6 @@ pub(super) fn document(
     textures: &Textures,
     carrier: &Carrier,
 ) -> Result<Vec<u8>, ExportError> {
-    let mut entries = Map::new();
-    for texture in &textures.list {
-        let mut entry = serde_json::to_value::<&Entry>(&texture.entry)?;
-        let (key, value) = match carrier {
-            Carrier::Files => ("file", texture.file.clone()),
-            Carrier::Inline => ("data", inline(&texture.file, &texture.bytes)),
-        };
-        entry[key] = value.into();
-        entries.insert(texture.name.into(), entry);
-    }
     let table = &paint.color_table;
     let document = Document {
         format: "carpaint material",
@@ -116,7 +109,7 @@ pub(super) fn document(
         provenance: &about.provenance,
         content_hash: paint.content_hash().to_hex().to_string(),
         model: MODEL,
-        color_space: "linear sRGB, D65; CIELAB of pi f relative to the perfect diffuser, D65, 2 degree observer",
+        color_space: COLOR_SPACE,
         coat: paint.coat.map(|coat| CoatEntry {
             ior: coat.ior,
             roughness: coat.roughness,
@@ -150,14 +143,40 @@ pub(super) fn document(
             }),
         }),
         settings: *settings,
-        textures: entries,
+        textures: texture_entries(textures, carrier)?,
         shader: "carpaint.glsl",
         clamped: &textures.clamped,
         report: &about.report,
-        documentation: documentation(),
+        documentation: numbers::documentation(&[
+            numbers::PAINT,
+            numbers::ANGLES,
+            numbers::GRAIN,
+            numbers::TEXTURES,
+            numbers::INVERSE_CDF,
+            numbers::REPORT,
+            numbers::PROVENANCE,
+        ]),
         shader_source: matches!(carrier, Carrier::Inline).then_some(super::SHADER),
     };
     Ok(serde_json::to_vec_pretty(&document)?)
+}
+
+/// What is told of each texture, by name.
+pub(super) fn texture_entries(
+    textures: &Textures,
+    carrier: &Carrier,
+) -> Result<Map<String, Value>, ExportError> {
+    let mut entries = Map::new();
+    for texture in &textures.list {
+        let mut entry = serde_json::to_value::<&Entry>(&texture.entry)?;
+        let (key, value) = match carrier {
+            Carrier::Files => ("file", texture.file.clone()),
+            Carrier::Inline => ("data", inline(&texture.file, &texture.bytes)),
+        };
+        entry[key] = value.into();
+        entries.insert(texture.name.into(), entry);
+    }
+    Ok(entries)
 }
 
 fn inline(file: &str, bytes: &[u8]) -> String {
@@ -173,105 +192,4 @@ fn inline(file: &str, bytes: &[u8]) -> String {
     let mut out = format!("data:image/{kind};base64,");
     base64::engine::general_purpose::STANDARD.encode_string(bytes, &mut out);
     out
-}
-
-/// Unit, range and meaning of every number, by its path; `[]` stands for every entry of a list.
-fn documentation() -> Value {
-    let mut out = Map::new();
-    for (path, unit, range, about) in NUMBERS {
-        let range = [range.0, range.1].map(|v| if v.is_finite() { json!(v) } else { Value::Null });
-        out.insert(
-            (*path).into(),
-            json!({"unit": unit, "range": range, "about": about}),
-        );
-    }
-    Value::Object(out)
-}
-
-const ANY: f64 = f64::INFINITY;
-
-/// Path, unit, range and meaning.
-#[rustfmt::skip]
-const NUMBERS: &[(&str, &str, (f64, f64), &str)] = &[
-    ("version", "1", (1.0, ANY), "version of this document's form; later versions may add, never change"),
-    ("coat.ior", "1", (1.0, 4.0), "index of refraction of the clear coat; below 1.0001 it is optically absent"),
-    ("coat.roughness", "1", (0.0, 1.0), "Beckmann roughness of the coat's highlight; below 0.001 a mirror"),
-    ("coat.thickness_um", "micrometre", (0.0, 1e6), "thickness as the lab stated it; not used"),
-    ("diffuse[]", "1", (0.0, 1000.0), "Lambertian albedo of the base before the color table, linear sRGB"),
-    ("lobes[].weight[]", "1", (0.0, 1000.0), "weight s of the lobe, linear sRGB"),
-    ("lobes[].alpha", "1", (0.0, 10.0), "Beckmann roughness, evaluated as at least 0.0001"),
-    ("lobes[].f0", "1", (0.0, 1.0), "Schlick reflectance at normal incidence"),
-    ("color_table.theta_h_deg[]", "degree", (0.0, 90.0), "half angle of each row, inside the coat"),
-    ("color_table.theta_d_deg[]", "degree", (0.0, 90.0), "difference angle of each column, inside the coat"),
-    ("color_table.overall[]", "1", (-ANY, ANY), "the one color that stands for the table, linear sRGB"),
-    ("flakes.theta_h_deg[]", "degree", (0.0, 90.0), "half angle of each row of slices, inside the coat"),
-    ("flakes.theta_d_deg[]", "degree", (0.0, 90.0), "difference angle of each column of slices, inside the coat"),
-    ("flakes.clusters", "1", (1.0, 16_777_216.0), "clusters of all slices"),
-    ("flakes.widest_slice", "1", (1.0, 16_777_216.0), "most clusters of a slice"),
-    ("flakes.texel_um", "micrometre", (0.0, 1e5), "side of a texel on the paint"),
-    ("flakes.grain_um", "micrometre", (0.0, 1e6), "distance over which the texels' autocorrelation falls to one half"),
-    ("flakes.lifetime_deg[]", "degree", (0.0, 1e4), "angle over which a slice's correlation falls to one half, along theta_h and theta_d"),
-    ("flakes.persistence_deg[]", "degree", (0.0, 1e4), "angle over which a texel keeps its random number, along theta_h and theta_d"),
-    ("flakes.cell_spacing_texels", "texel", (0.0, ANY), "distance of the cells that share a random number"),
-    ("flakes.tile_texels", "texel", (1.0, ANY), "side of the random texture"),
-    ("flakes.corner_rounding_lab", "CIELAB", (0.0, ANY), "largest rounding of a box corner in the corner textures"),
-    ("flakes.inverse_cdf.steps", "1", (500.0, 500.0), "steps of the inverse cumulative distribution"),
-    ("flakes.inverse_cdf.blocks", "1", (1.0, ANY), "slices that stand side by side in a row of its texture"),
-    ("flakes.inverse_cdf.probability_loss[]", "1", (0.0, 1.0), "per slice (theta_d fastest): share of draws that show another cluster than they should (total variation)"),
-    ("flakes.inverse_cdf.mean_luminance_change[]", "1", (-1.0, ANY), "per slice: change of the mean luminance by the steps, relative; 0 where the mean is below 1e-6 1/sr"),
-    ("textures.*.width", "texel", (1.0, 4096.0), "columns"),
-    ("textures.*.height", "texel", (1.0, 4096.0), "rows; row 0 is the first line of the file"),
-    ("textures.*.scale[]", "as the texture", (0.0, ANY), "value = offset + scale * texel, texel 0 to 1; absent: value = texel"),
-    ("textures.*.offset[]", "as the texture", (-ANY, ANY), "see scale"),
-    ("clamped[].count", "1", (1.0, ANY), "numbers of this texture outside the range of its type"),
-    ("clamped[].farthest", "as the texture", (-ANY, ANY), "the farthest of them"),
-    ("clamped[].limit", "as the texture", (65504.0, 65504.0), "the magnitude they were held to"),
-];
-
-#[cfg(test)]
-pub(super) mod tests {
-    use super::*;
-
-    /// Paths of all numbers in a value, lists as `[]`, textures as `*`.
-    fn paths(value: &Value, path: &str, out: &mut std::collections::BTreeSet<String>) {
-        match value {
-            Value::Number(_) => {
-                out.insert(path.to_string());
-            }
-            Value::Array(list) => list
-                .iter()
-                .for_each(|entry| paths(entry, &format!("{path}[]"), out)),
-            Value::Object(map) => {
-                for (key, entry) in map {
-                    let key = if path == "textures" { "*" } else { key };
-                    paths(
-                        entry,
-                        &if path.is_empty() {
-                            key.to_string()
-                        } else {
-                            format!("{path}.{key}")
-                        },
-                        out,
-                    );
-                }
-            }
-            _ => {}
-        }
-    }
-
-    /// Fails when a number of the document is not explained, or lies outside the range that is told.
-    pub fn assert_documented(document: &Value) {
-        let mut found = std::collections::BTreeSet::new();
-        for (key, value) in document.as_object().expect("an object") {
-            if !["report", "documentation", "provenance"].contains(&key.as_str()) {
-                paths(value, key, &mut found);
-            }
-        }
-        for path in found {
-            assert!(
-                document["documentation"].get(&path).is_some(),
-                "{path} is not documented"
-            );
-        }
-    }
 }

@@ -256,6 +256,7 @@ fn chunks(document: &[u8], body: &[u8]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::export::assert_documented;
     use crate::export::made_up::{about, metallic};
 
     fn parse(bytes: &[u8]) -> (Value, &[u8]) {
@@ -297,8 +298,24 @@ mod tests {
         let upper: Vec<[f32; 3]> =
             bytemuck::pod_collect_to_vec(&body[at..at + index(&view["byteLength"])]);
         assert_eq!(upper, paint.flakes.as_ref().expect("flakes").upper);
-        assert_eq!(carpaint["report"]["weights"][0], 1.0);
+        assert_eq!(carpaint["report"]["weights"]["weights"][0], 1.0);
         assert!(carpaint["loss"]["median"].as_f64().expect("a number") < 5.0);
+    }
+
+    #[test]
+    fn every_number_of_the_extras_is_explained() {
+        let paint = metallic(6, 5, 20);
+        for paint in [
+            paint.clone(),
+            CarPaint {
+                flakes: None,
+                ..paint
+            },
+        ] {
+            let bytes = glb(&paint, &about(), &ExportSettings::default()).expect("written");
+            let (document, _) = parse(&bytes);
+            assert_documented(&document["materials"][0]["extras"]["carpaint"]);
+        }
     }
 
     #[test]

@@ -55,7 +55,8 @@ pub(super) fn bake(
     let tile = RandomTexture::of(&flakes.texture);
     let cells = tile.cells();
     let width = tile.width() as usize;
-    let facet = facets(reflectance, flakes, material, f0);
+    let baked = BakedSlice::of(reflectance, flakes);
+    let facet = facets(reflectance, &baked, material, f0);
     let mut all: Vec<Facet> = Vec::with_capacity(cells.len());
     for (k, &cell) in cells.iter().enumerate() {
         // Cells are wider than texels: most repeat the texel beside or above.
@@ -98,34 +99,51 @@ pub(super) fn bake(
     })
 }
 
+/// The flakes nearest to the geometry that is baked.
+struct BakedSlice {
+    flakes: Flakes,
+    theta_h_deg: f32,
+    theta_d_deg: f32,
+}
+
+impl BakedSlice {
+    /// On the nearest slice itself a draw is one draw, not a mixture of four.
+    fn of(reflectance: &Reflectance<'_>, flakes: &Flakes) -> Self {
+        let (wi, wo) = instrument_pairs()[BAKED_GEOMETRY];
+        let half = reflectance.terms(wi, wo, Chi::Table).map(|t| t.half);
+        let nearest = |grid: &crate::paint::AngleGrid, angle: Option<f64>| {
+            let bracket = grid.bracket(angle.unwrap_or(0.0).to_degrees());
+            let index = if bracket.fraction < 0.5 {
+                bracket.low
+            } else {
+                bracket.high
+            };
+            #[allow(clippy::cast_possible_truncation)] // angles at texel precision
+            let angle = grid.degrees()[index] as f32;
+            (index, angle)
+        };
+        let (row, theta_h_deg) = nearest(&flakes.theta_h, half.map(|h| h.theta_h));
+        let (column, theta_d_deg) = nearest(&flakes.theta_d, half.map(|h| h.theta_d));
+        Self {
+            flakes: flakes.only(&[row], &[column]),
+            theta_h_deg,
+            theta_d_deg,
+        }
+    }
+}
+
 /// What a cell becomes.
 fn facets<'a>(
-    reflectance: &'a Reflectance<'_>,
-    flakes: &'a Flakes,
+    reflectance: &Reflectance<'_>,
+    baked: &'a BakedSlice,
     material: &GltfMaterial,
     f0: LinearRgb,
 ) -> impl Fn(u32) -> Facet + 'a {
     let (wi, wo) = instrument_pairs()[BAKED_GEOMETRY];
-    let terms = reflectance.terms(wi, wo, Chi::Table);
-    let half = terms.map_or([0.0; 2], |t| {
-        [t.half.theta_h.to_degrees(), t.half.theta_d.to_degrees()]
-    });
-    // On the nearest slice itself a draw is one draw, not a mixture of four.
-    let nearest = |grid: &crate::paint::AngleGrid, angle: f64| {
-        let bracket = grid.bracket(angle);
-        let index = if bracket.fraction < 0.5 {
-            bracket.low
-        } else {
-            bracket.high
-        };
-        #[allow(clippy::cast_possible_truncation)] // angles at texel precision
-        let angle = grid.degrees()[index] as f32;
-        (index, angle)
-    };
-    let (row, theta_h) = nearest(&flakes.theta_h, half[0]);
-    let (column, theta_d) = nearest(&flakes.theta_d, half[1]);
-    let mean = flakes.slice(row, column).mean();
-    let transmission = terms.map_or(1.0, |t| t.transmission);
+    let transmission = reflectance
+        .terms(wi, wo, Chi::Table)
+        .map_or(1.0, |t| t.transmission);
+    let mean = baked.flakes.slice_at(0).mean();
     // The lobe alone, without diffuse and coat.
     let lobe = GltfMaterial {
         base_color: [0.0; 3],
@@ -134,10 +152,10 @@ fn facets<'a>(
     }
     .evaluate(wi, wo);
     let gain: [f64; 3] = lobe.map(|s| transmission / s.max(1e-5));
-    let sampler = FlakeSampler::new(flakes);
+    let sampler = FlakeSampler::new(&baked.flakes);
     let slope = (TILT_SHARE * material.roughness.powi(2)).min(TILT_MAX);
     move |cell| {
-        let color = sampler.color(cell, theta_h, theta_d);
+        let color = sampler.color(cell, baked.theta_h_deg, baked.theta_d_deg);
         #[allow(clippy::cast_possible_truncation)] // texel precision
         let f0 = std::array::from_fn(|k| {
             let relative = (1.0 + gain[k] * (f64::from(color[k]) - mean[k])).max(DARKEST);

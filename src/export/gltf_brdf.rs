@@ -275,6 +275,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn it_is_finite_and_not_negative(
             base_color in prop::array::uniform3(0.0..=1.0_f64), specular_color in prop::array::uniform3(0.0..=3.0_f64),

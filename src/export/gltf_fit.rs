@@ -107,6 +107,16 @@ fn target(
     })
 }
 
+/// What the paint shows at the instrument's geometries and beside them.
+fn targets(reflectance: &Reflectance<'_>) -> Vec<Target> {
+    instrument_pairs()
+        .into_iter()
+        .map(|pair| (pair, 1.0))
+        .chain(pairs_beside().map(|pair| (pair, BESIDE)))
+        .filter_map(|(pair, weight)| target(reflectance, pair, weight))
+        .collect()
+}
+
 /// CIELAB of a BRDF value under the instrument's light.
 fn reflected(f: LinearRgb) -> Lab {
     Lab::from_rgb(f.map(|v| std::f64::consts::PI * v))
@@ -141,12 +151,7 @@ fn hue_travels(targets: &[Target]) -> bool {
 
 /// The material, with the loss that it has.
 pub(super) fn fit(reflectance: &Reflectance<'_>) -> (GltfMaterial, LossReport) {
-    let targets: Vec<Target> = instrument_pairs()
-        .into_iter()
-        .map(|pair| (pair, 1.0))
-        .chain(pairs_beside().map(|pair| (pair, BESIDE)))
-        .filter_map(|(pair, weight)| target(reflectance, pair, weight))
-        .collect();
+    let targets = targets(reflectance);
     let mut best = fit_plain(reflectance, &targets);
     if best.merit > GOOD_ENOUGH && hue_travels(&targets) {
         let film = fit_film(&best, &targets);
@@ -437,129 +442,4 @@ fn fit_film(plain: &Candidate, targets: &[Target]) -> Candidate {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::export::made_up::metallic;
-    use crate::paint::{CarPaint, ColorTable, Lobe};
-
-    #[test]
-    fn what_gltf_can_say_it_says() {
-        // A Lambertian base under a coat is a glTF material but for the coat's transmission.
-        let paint = CarPaint {
-            coat: None,
-            diffuse: [0.3, 0.1, 0.05],
-            lobes: vec![],
-            color_table: ColorTable::white(),
-            flakes: None,
-        };
-        let (_, loss) = fit(&Reflectance::new(&paint));
-        assert!(loss.worst < 1.0, "{loss:?}");
-    }
-
-    #[test]
-    fn a_metallic_is_met_within_a_just_visible_difference() {
-        let paint = metallic(8, 6, 20);
-        let (material, loss) = fit(&Reflectance::new(&paint));
-        assert!(loss.median < 3.0, "{loss:?} {material:?}");
-    }
-
-    /// Günther et al. 2005: diffuse; weights of three lobes; α; F0. The published flakes are not part of the fits.
-    const PUBLISHED: [(&str, [[f64; 3]; 6]); 4] = [
-        (
-            "silver",
-            [
-                [0.055, 0.063, 0.071],
-                [0.065, 0.082, 0.088],
-                [0.11, 0.11, 0.13],
-                [0.008, 0.013, 0.015],
-                [0.38, 0.17, 0.013],
-                [1.0, 0.92, 0.9],
-            ],
-        ),
-        (
-            "gray",
-            [
-                [0.012, 0.015, 0.016],
-                [0.062, 0.076, 0.08],
-                [0.11, 0.12, 0.12],
-                [0.0083, 0.015, 0.016],
-                [0.39, 0.17, 0.013],
-                [0.92, 0.87, 0.9],
-            ],
-        ),
-        (
-            "blue",
-            [
-                [0.0079, 0.023, 0.1],
-                [0.0011, 0.0015, 0.0019],
-                [0.025, 0.03, 0.043],
-                [0.059, 0.074, 0.082],
-                [0.15, 0.043, 0.02],
-                [1.0, 0.094, 0.17],
-            ],
-        ),
-        (
-            "acrylic",
-            [
-                [0.42, 0.32, 0.1],
-                [0.0, 0.0, 0.0],
-                [0.028, 0.026, 0.006],
-                [0.017, 0.0075, 0.0041],
-                [0.88, 0.8, 0.015],
-                [1.0, 0.9, 0.17],
-            ],
-        ),
-    ];
-
-    #[test]
-    fn published_paints_are_met() {
-        for (name, [diffuse, first, second, third, alpha, f0]) in PUBLISHED {
-            let lobe = |k: usize, weight| Lobe {
-                weight,
-                alpha: alpha[k],
-                f0: f0[k],
-            };
-            let lobes = vec![lobe(0, first), lobe(1, second), lobe(2, third)];
-            let paint = CarPaint {
-                coat: None,
-                diffuse,
-                lobes,
-                color_table: ColorTable::white(),
-                flakes: None,
-            };
-            let (material, loss) = fit(&Reflectance::new(&paint));
-            assert!(loss.median < 3.0 && loss.worst < 10.0, "{name}: {loss:?}");
-            assert!(
-                material.clearcoat > 0.1 && material.clearcoat_roughness < 0.2,
-                "{name} keeps its lacquer"
-            );
-        }
-    }
-
-    #[test]
-    fn a_paint_whose_hue_travels_becomes_iridescent_only_where_that_helps() {
-        let travelling = |reach: f64| {
-            let mut paint = metallic(8, 6, 20);
-            let flakes = paint.flakes.as_mut().expect("flakes");
-            let columns = flakes.theta_d.len();
-            for slice in 0..flakes.slices() {
-                let turn = reach * (slice / columns) as f64 / flakes.theta_h.len() as f64;
-                let range = flakes.offsets[slice] as usize..flakes.offsets[slice + 1] as usize;
-                for k in range {
-                    let (a, b) = (40.0 * turn.cos(), 40.0 * turn.sin());
-                    for corner in [&mut flakes.lower[k], &mut flakes.upper[k]] {
-                        (corner[1], corner[2]) = (corner[1] + a as f32, corner[2] + b as f32);
-                    }
-                }
-            }
-            fit(&Reflectance::new(&paint))
-        };
-        let (still, _) = fit(&Reflectance::new(&metallic(8, 6, 20)));
-        assert_eq!(still.iridescence, 0.0);
-        let (material, loss) = travelling(2.5);
-        assert!(
-            material.iridescence == 0.0 || loss.median < 12.0,
-            "{loss:?}"
-        );
-    }
-}
+mod tests;

@@ -6,6 +6,7 @@ use super::About;
 use super::gltf_brdf::GltfMaterial;
 use super::gltf_fit::LossReport;
 use super::gltf_mesh::REPEATS;
+use super::numbers::{ANGLES, ANY, GRAIN, Number, PAINT, PROVENANCE, REPORT, documentation};
 use crate::paint::{CarPaint, RandomTexture, cell_spacing};
 
 /// The material and the extensions it uses; `textures` are those of F0 and of the normals.
@@ -108,62 +109,26 @@ pub(super) fn extras(
         "ball_radius_m": radius,
         "loss": loss,
         "report": about.report,
-        "documentation": DOCUMENTATION.iter().map(|&(k, v)| (k.to_string(), v.into())).collect::<Map<_, _>>(),
+        "documentation": documentation(&[PAINT, ANGLES, GRAIN, EXTRAS, REPORT, PROVENANCE]),
     })
 }
 
-/// What the extras mean; the model's formula is in a texture bundle's `material.json`.
-const DOCUMENTATION: [(&str, &str); 13] = [
-    (
-        "coat",
-        "ior 1 to 4; Beckmann roughness 0 to 1, below 0.001 a mirror; thickness in micrometres, not used",
-    ),
-    (
-        "diffuse",
-        "Lambertian albedo before the color table, linear sRGB, 0 to 1000",
-    ),
-    (
-        "lobes",
-        "weight s per channel (0 to 1000), Beckmann alpha (0 to 10), Schlick f0 (0 to 1)",
-    ),
-    (
-        "color_table",
-        "color of diffuse and lobes; nodes: accessor, linear sRGB, theta_d fastest; angles in degrees inside the coat",
-    ),
-    (
-        "flakes.offsets",
-        "accessor: first cluster of every slice, theta_d fastest, and one past the last",
-    ),
-    (
-        "flakes.probability",
-        "accessor: probability of every cluster, sums to 1 in a slice within 32-bit rounding",
-    ),
-    (
-        "flakes.lower, flakes.upper",
-        "accessors: corners of every cluster's box, CIELAB of pi f (D65, 2 degree observer), colors uniform inside",
-    ),
-    (
-        "flakes.texel_um, grain_um",
-        "side of a texel; distance over which the texels' autocorrelation falls to one half; micrometres",
-    ),
-    (
-        "flakes.lifetime_deg, persistence_deg",
-        "angle over which a slice's correlation falls to one half; angle over which a texel keeps its random number; degrees along theta_h and theta_d",
-    ),
-    (
-        "flakes.tile_um",
-        "side of the baked textures on the paint, micrometres: repeat uv so on a mesh of your own",
-    ),
-    (
-        "loss.delta_e2000",
-        "CIEDE2000 between this material, textures averaged, by the BRDF of the glTF specification, and the paint, light at 45 degrees, per aspecular angle",
-    ),
-    (
-        "loss.delta_e2000_over_normals",
-        "the same, averaged over the tilts of the normal texture instead of along the mean normal",
-    ),
-    (
-        "report",
-        "what was clamped, blended and warned of on the way",
-    ),
+/// Lists and losses of the extras; the model's formula is in a texture bundle's `material.json`.
+#[rustfmt::skip]
+const EXTRAS: &[Number] = &[
+    ("color_table.nodes", "accessor", (0.0, ANY), "index of the accessor with the colors of diffuse and lobes, linear sRGB, theta_d fastest"),
+    ("flakes.offsets", "accessor", (0.0, ANY), "index of the accessor with the first cluster of every slice, theta_d fastest, and one past the last"),
+    ("flakes.probability", "accessor", (0.0, ANY), "index of the accessor with the probability of every cluster, which sums to 1 in a slice within 32-bit rounding"),
+    ("flakes.lower", "accessor", (0.0, ANY), "index of the accessor with the corner of least L, a, b of every cluster's box, CIELAB of pi f (D65, 2 degree observer), colors uniform inside"),
+    ("flakes.upper", "accessor", (0.0, ANY), "index of the accessor with the corner of largest L, a, b of every cluster's box"),
+    ("flakes.tile_um", "micrometre", (0.0, ANY), "side of the baked textures on the paint: repeat uv so on a mesh of your own"),
+    ("flakes.tiles_around_the_ball", "1", (1.0, ANY), "repetitions of the baked textures around this file's ball"),
+    ("ball_radius_m", "metre", (0.0, ANY), "radius of this file's ball, on which texels have their true size"),
+    ("loss.aspecular_deg[]", "degree", (-90.0, 180.0), "aspecular angle of each geometry, light at 45 degrees"),
+    ("loss.delta_e2000[]", "CIEDE2000", (0.0, ANY), "at each geometry between the paint and this material, textures averaged, by the BRDF of the glTF specification"),
+    ("loss.delta_e2000_over_normals[]", "CIEDE2000", (0.0, ANY), "the same, averaged over the tilts of the normal texture instead of along the mean normal"),
+    ("loss.median", "CIEDE2000", (0.0, ANY), "median of loss.delta_e2000"),
+    ("loss.worst", "CIEDE2000", (0.0, ANY), "largest of loss.delta_e2000"),
+    ("loss.paint_lab[][]", "CIELAB", (-ANY, ANY), "L, a, b of the paint at each geometry, D65, 2 degree observer; above 100 where it outshines the perfect diffuser"),
+    ("loss.material_lab[][]", "CIELAB", (-ANY, ANY), "L, a, b of the material likewise"),
 ];

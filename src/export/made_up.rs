@@ -83,6 +83,6 @@ pub(super) fn about() -> About {
     About {
         name: "made up".into(),
         provenance: Provenance::default(),
-        report: serde_json::json!({"weights": [1.0]}),
+        report: serde_json::json!({"weights": {"weights": [1.0]}}),
     }
 }

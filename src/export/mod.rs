@@ -2,12 +2,15 @@
 //!
 //! One file per format, each a function from a paint to bytes: [`bundle`] (a `.zip` of textures, shader and
 //! `material.json`), [`material_json`] (the same in one JSON), [`glb`] (a fitted glTF material that carries the
-//! statistical flakes beside it). The same paint, [`About`] and [`ExportSettings`] give the same bytes on every machine
+//! statistical flakes beside it); and [`blend_bundle`], from a whole blend to one `.zip` whose shader mixes the paints
+//! at any weights. The same paint, [`About`] and [`ExportSettings`] give the same bytes on every machine
 //! that rounds alike; neither a clock nor the output's own name gets in.
 //!
 //! Left to others: pictures (`render`), mixing (`blend`), compressing for the wire (`service`).
 
 mod alias;
+mod blend_bundle;
+mod blend_document;
 mod bundle;
 mod clamp;
 mod document;
@@ -23,11 +26,13 @@ mod inverse_cdf;
 #[cfg(test)]
 mod made_up;
 mod material_json;
+mod numbers;
 mod png_file;
 mod rounding;
 mod textures;
 
 pub use alias::{AliasEntry, alias_table};
+pub use blend_bundle::blend_bundle;
 pub use bundle::bundle;
 pub use clamp::Clamped;
 pub use glb::glb;
@@ -35,6 +40,8 @@ pub use gltf_brdf::GltfMaterial;
 pub use gltf_fit::LossReport;
 pub use inverse_cdf::{InverseCdf, inverse_cdf};
 pub use material_json::material_json;
+#[cfg(test)]
+pub(crate) use numbers::tests::assert_documented;
 pub use rounding::Rounding;
 
 use serde::{Deserialize, Serialize};

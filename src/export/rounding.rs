@@ -18,7 +18,7 @@ impl Rounding {
     #[must_use]
     pub fn of(flakes: &Flakes, precision: Precision) -> Self {
         let range = (precision == Precision::Eight).then(|| {
-            let range = Range8::of(flakes);
+            let range = Range8::of(&flakes.lower, &flakes.upper);
             (range.scale, range.offset)
         });
         Self { precision, range }

@@ -4,6 +4,8 @@
 //! `c div width` of every cluster texture. Cumulative probabilities, thresholds and indices are always 32-bit floats: a
 //! half next to 1 has steps of 0.0005, and the clusters up there are the sparkle.
 
+use std::sync::OnceLock;
+
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 use image::ExtendedColorType;
@@ -14,12 +16,12 @@ use super::exr_file::{Plane, exr};
 use super::png_file::png;
 use super::{ExportError, ExportSettings, Precision, alias, inverse_cdf};
 use crate::color::{LinearRgb, luminance};
-use crate::paint::{CarPaint, FlakeSampler, Flakes, RandomTexture, mean_color};
+use crate::paint::{CarPaint, Flakes, RandomTexture, cumulative, mean_color};
 
 /// Largest number of clusters: their numbers are exact in a 32-bit float.
-const MAX_CLUSTERS: usize = 1 << 24;
+pub(super) const MAX_CLUSTERS: usize = 1 << 24;
 /// Rows of a texture that every WebGL2 reaches in practice.
-const MAX_ROWS: usize = 4096;
+pub(super) const MAX_ROWS: usize = 4096;
 
 /// A texture on its way out.
 #[derive(Clone, Debug)]
@@ -87,7 +89,7 @@ impl Textures {
     }
 
     /// A table of linear colors. Eight bits of linear light band: such tables stay halves.
-    fn colors(
+    pub(super) fn colors(
         &mut self,
         name: &'static str,
         width: usize,
@@ -192,7 +194,7 @@ impl Textures {
         Ok(())
     }
 
-    fn angles(&mut self, paint: &CarPaint) {
+    pub(super) fn angles(&mut self, paint: &CarPaint) {
         let table = &paint.color_table;
         let mut rows = vec![table.theta_h().degrees(), table.theta_d().degrees()];
         if let Some(flakes) = &paint.flakes {
@@ -230,21 +232,32 @@ impl Textures {
             about,
         )?;
         self.slices(flakes)?;
-        self.corners(flakes, width, settings.precision)?;
-        let mut cumulative = FlakeSampler::new(flakes).cumulative().to_vec();
-        cumulative.resize(clusters.div_ceil(width) * width, 1.0);
-        let about = "cumulative probability of every cluster within its slice";
-        self.floats("cumulative", width, &[("R", &cumulative)], about)?;
-        if settings.alias {
-            self.alias(flakes, width)?;
-        }
+        self.corners(&flakes.lower, &flakes.upper, width, settings.precision)?;
+        self.probability(flakes, width, settings.alias)?;
         if settings.inverse_cdf {
             self.inverse_cdf(flakes, &luminances)?;
         }
         self.random(flakes)
     }
 
-    fn slices(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
+    /// How clusters are drawn: cumulative probability, and the alias table where it is wanted.
+    pub(super) fn probability(
+        &mut self,
+        flakes: &Flakes,
+        width: usize,
+        alias: bool,
+    ) -> Result<(), ExportError> {
+        let mut cumulative = cumulative(flakes);
+        cumulative.resize(flakes.clusters().div_ceil(width) * width, 1.0);
+        let about = "cumulative probability of every cluster within its slice";
+        self.floats("cumulative", width, &[("R", &cumulative)], about)?;
+        if alias {
+            self.alias(flakes, width)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn slices(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
         #[allow(clippy::cast_precision_loss)] // below 2^24, exact
         let exact = |n: u32| n as f32;
         let first: Vec<f32> = flakes.offsets[..flakes.slices()]
@@ -265,9 +278,11 @@ impl Textures {
         )
     }
 
-    fn corners(
+    /// Boxes in rows of `width`.
+    pub(super) fn corners(
         &mut self,
-        flakes: &Flakes,
+        lower: &[[f32; 3]],
+        upper: &[[f32; 3]],
         width: usize,
         precision: Precision,
     ) -> Result<(), ExportError> {
@@ -275,12 +290,12 @@ impl Textures {
             "corner of smallest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
         let about_upper =
             "corner of largest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
-        let texels = flakes.clusters().div_ceil(width) * width;
+        let texels = lower.len().div_ceil(width) * width;
         let height = texels / width;
-        let range = Range8::of(flakes);
+        let range = Range8::of(lower, upper);
         let both = [
-            ("corners_lower", &flakes.lower, about_lower),
-            ("corners_upper", &flakes.upper, about_upper),
+            ("corners_lower", lower, about_lower),
+            ("corners_upper", upper, about_upper),
         ];
         for (name, corners, about) in both {
             let entry = |kind| Entry {
@@ -379,15 +394,11 @@ impl Textures {
         self.slice_losses.reserve(slices);
         for k in 0..slices {
             let range = flakes.offsets[k] as usize..flakes.offsets[k + 1] as usize;
-            let mut texels = index[k / blocks * width + k % blocks * steps..].iter_mut();
-            let loss = inverse_cdf::append(
+            let first = k / blocks * width + k % blocks * steps;
+            let loss = inverse_cdf::write(
                 &flakes.probability[range.clone()],
                 &luminances[range],
-                |cluster| {
-                    if let (Some(texel), Ok(cluster)) = (texels.next(), u16::try_from(cluster)) {
-                        *texel = cluster;
-                    }
-                },
+                &mut index[first..first + steps],
             );
             #[allow(clippy::cast_possible_truncation)] // stated to seven digits
             self.slice_losses.push(loss.map(|v| v as f32));
@@ -424,15 +435,23 @@ impl Textures {
         Ok(())
     }
 
-    fn random(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
+    pub(super) fn random(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
+        static KNOWN: [OnceLock<Vec<u8>>; RandomTexture::KINDS] =
+            [const { OnceLock::new() }; RandomTexture::KINDS];
         let tile = RandomTexture::of(&flakes.texture);
-        let pixels: Vec<u8> = tile
-            .cells()
-            .iter()
-            .flat_map(|cell| cell.to_le_bytes())
-            .collect();
         let (width, height) = (tile.width() as usize, tile.height() as usize);
-        let bytes = png(width, height, &pixels, ExtendedColorType::Rgba8)?;
+        let known = &KNOWN[RandomTexture::kind(&flakes.texture)];
+        let bytes = if let Some(bytes) = known.get() {
+            bytes.clone()
+        } else {
+            let pixels: Vec<u8> = tile
+                .cells()
+                .iter()
+                .flat_map(|cell| cell.to_le_bytes())
+                .collect();
+            let bytes = png(width, height, &pixels, ExtendedColorType::Rgba8)?;
+            known.get_or_init(|| bytes).clone()
+        };
         let about = "32-bit number of every texel's cell, lowest byte in R, highest in A (read it without \
                      premultiplication or color management); the tile repeats, see carpaint_cell in the shader";
         let entry = Entry {
@@ -495,10 +514,10 @@ pub(super) struct Range8 {
 }
 
 impl Range8 {
-    pub(super) fn of(flakes: &Flakes) -> Self {
+    pub(super) fn of(lower: &[[f32; 3]], upper: &[[f32; 3]]) -> Self {
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];
-        for corner in flakes.lower.iter().chain(&flakes.upper) {
+        for corner in lower.iter().chain(upper) {
             for k in 0..3 {
                 low[k] = low[k].min(corner[k]);
                 high[k] = high[k].max(corner[k]);

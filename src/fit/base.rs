@@ -4,10 +4,11 @@
 //! brings the result clearly nearer to the measurement, or when the bare fit misses its aim and the coat helps:
 //! a second, wide lobe must not become a coat for a per cent.
 
-use super::color_table::{Frame, fit_color_table};
-use super::directions::{Sample, TRUSTED_DEG, measure};
+use super::color_table::{Frame, TableFit, fit_color_table};
+use super::directions::{TRUSTED_DEG, measure};
 use super::lobes::{CoatSearch, Shape, fit_shape, unit_of};
 use super::residual::{Judge, Percentiles};
+use super::steps::Tell;
 use crate::color::LinearRgb;
 use crate::measurement::MeasuredBrdf;
 use crate::paint::{
@@ -26,6 +27,9 @@ const CLEAR_ROUGHNESS: f64 = 0.1;
 const CLEAR_IOR: f64 = 1.3;
 /// What it must fall by where the bare fit misses [`AIM`].
 const COAT_GAIN_IN_NEED: f64 = 0.03;
+/// Share of the time after which the measurement is judged, and share of a search that goes into the shape.
+const JUDGED: f32 = 0.1;
+const SHAPED: f32 = 0.8;
 /// Error against the floor that a fit aims at.
 const AIM: f64 = 1.2;
 
@@ -108,6 +112,19 @@ struct Candidate {
 /// [`FitError`] for an index out of range, a measurement with too few valid values or no light at all, and one whose
 /// values are no reflectance.
 pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedBase, FitError> {
+    fit_base_telling(measured, coat, &|_| ())
+}
+
+/// The same, with a function that hears the share done, 0 to 1, after every start of a search and every node of a table.
+///
+/// # Errors
+///
+/// As [`fit_base`].
+pub fn fit_base_telling(
+    measured: &dyn MeasuredBrdf,
+    coat: CoatChoice,
+    progress: Tell<'_>,
+) -> Result<FittedBase, FitError> {
     let (frame, searches) = match coat {
         CoatChoice::ByResidual => (Frame::Air, vec![CoatSearch::Bare, CoatSearch::Free]),
         CoatChoice::Ior(ior) | CoatChoice::Inside(ior) if !(1.0..=4.0).contains(&ior) => {
@@ -119,10 +136,11 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
     };
     // Inside a coat light never leaves the cone of total reflection.
     let cone = match frame {
-        Frame::Inside(ior) if ior > 1.0 => (1.0 / ior).asin().to_degrees() + 5.0,
+        Frame::Inside(ior) if ior > 1.0 => ((1.0 / ior).asin().to_degrees() + 5.0).min(TRUSTED_DEG),
         _ => TRUSTED_DEG,
     };
-    let samples = measure(measured, SAMPLES, cone.min(TRUSTED_DEG), 0xBA5E);
+    progress(0.0);
+    let samples = measure(measured, SAMPLES, cone, 0xBA5E);
     if samples.len() < LEAST_SAMPLES {
         return Err(FitError::TooFewSamples {
             found: samples.len(),
@@ -134,17 +152,26 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
         return Err(FitError::Dark);
     }
     let unit = unit_of(&samples);
-    let judge = Judge::new(measured, frame, unit);
+    progress(0.02);
+    let judge = Judge::new(measured, frame, cone, unit);
     let floors = judge.floor_errors();
     let mut candidates: Vec<Candidate> = Vec::new();
-    for search in searches {
+    #[allow(clippy::cast_precision_loss)] // a progress bar
+    let each = (1.0 - JUDGED) / searches.len() as f32;
+    for (k, search) in searches.into_iter().enumerate() {
+        #[allow(clippy::cast_precision_loss)] // a progress bar
+        let begun = JUDGED + each * k as f32;
+        progress(begun);
         let bare = candidates.first().map(|c| &c.shape);
-        let Some(shape) = fit_shape(&samples, search, unit, bare) else {
+        let shape = fit_shape(&samples, search, unit, bare, &|share| {
+            progress(begun + each * SHAPED * share);
+        });
+        let Some(shape) = shape else {
             continue;
         };
-        candidates.push(candidate(
-            measured, frame, shape, &samples, unit, &judge, &floors,
-        ));
+        let tell = |share: f32| progress(begun + each * (SHAPED + (1.0 - SHAPED) * share));
+        let table = fit_color_table(measured, &shape, frame, &samples, unit, &tell);
+        candidates.push(candidate(shape, table, &judge, &floors));
     }
     let mut candidates = candidates.into_iter();
     let mut best = candidates.next().ok_or(FitError::NoAnswer)?;
@@ -167,15 +194,11 @@ pub fn fit_base(measured: &dyn MeasuredBrdf, coat: CoatChoice) -> Result<FittedB
 }
 
 fn candidate(
-    measured: &dyn MeasuredBrdf,
-    frame: Frame,
     shape: Shape,
-    samples: &[Sample],
-    unit: f64,
+    fitted: TableFit,
     judge: &Judge,
     floors: &[Percentiles; 2],
 ) -> Candidate {
-    let fitted = fit_color_table(measured, &shape, frame, samples, unit);
     let paint = paint_of(&shape, fitted.table.clone());
     let reflectance = Reflectance::new(&paint);
     let with = |chi: Chi| {

@@ -57,18 +57,21 @@ pub(super) fn moments(members: &[Texel], light: &[[f32; 4]], more: LinearRgb) ->
     }
     let count = members.len() as f64;
     let mean: [f64; 3] = std::array::from_fn(|k| origin[k] + first[k] / count);
+    let variance =
+        std::array::from_fn(|k| (second[k] / count - (first[k] / count).powi(2)).max(0.0));
+    let light = std::array::from_fn(|k| sum[k] / count + more[k]);
+    of_moments(mean, variance, light)
+}
+
+/// The box of this mean and variance in Lab whose middle is moved until its mean in linear light is `light`.
+pub(super) fn of_moments(mean: [f64; 3], variance: [f64; 3], light: LinearRgb) -> Corners {
+    // A box must not reach beyond the bounds, wherever its mean moves it.
     let half = std::array::from_fn(|k| {
-        let variance = (second[k] / count - (first[k] / count).powi(2)).max(0.0);
-        // A box must not reach beyond the bounds, wherever its mean moves it.
-        (3.0 * variance)
+        (3.0 * variance[k])
             .sqrt()
             .min((MAX_LAB - mean[k].abs()).max(0.0))
     });
-    let center = center_of_mean(
-        half,
-        std::array::from_fn(|k| sum[k] / count + more[k]),
-        mean,
-    );
+    let center = center_of_mean(half, light, mean);
     let bound = MAX_LAB as f32;
     let corner = |sign: f64| {
         std::array::from_fn(|k| ((center[k] + sign * half[k]) as f32).clamp(-bound, bound))

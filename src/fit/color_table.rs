@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 use super::directions::{Sample, Stream, TRUSTED_DEG};
 use super::lobes::{DARK, Shape};
+use super::steps::{Steps, Tell};
 use crate::color::{Lab, LinearRgb, ciede2000, luminance};
 use crate::measurement::{MeasuredBrdf, half_frame_pair};
 use crate::paint::{
@@ -306,6 +307,7 @@ pub(super) fn fit_color_table(
     frame: Frame,
     samples: &[Sample],
     unit: f64,
+    tell: Tell<'_>,
 ) -> TableFit {
     let bent = match frame {
         Frame::Air => shape.coat.map_or(1.0, |c| c.0),
@@ -331,9 +333,11 @@ pub(super) fn fit_color_table(
         shape,
         unit,
     };
+    let steps = Steps::new(rows.len() * columns.len(), tell);
     let nodes: Vec<Node> = (0..rows.len() * columns.len())
         .into_par_iter()
         .map(|k| {
+            steps.done(1);
             let (r, c) = (k / columns.len(), k % columns.len());
             let here = |a: &&(f64, f64, Terms)| {
                 (a.0 - rows[r]).abs() < 1e-5 && (a.1 - columns[c]).abs() < 1e-5

@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 use super::directions::{NEAR_MIRROR_DEG, Sample};
 use super::least_squares::{Minimum, Normal, Problem, minimise};
+use super::steps::{Steps, Tell};
 use crate::paint::{Direction, fresnel, half_angles, refract};
 
 /// Lobes of a fitted paint.
@@ -350,6 +351,10 @@ pub(super) fn unit_of(samples: &[Sample]) -> f64 {
     }
 }
 
+/// Minima that are refined on all samples, and how many starts each of them is worth in time.
+const FINALISTS: usize = 2;
+const FINALIST_STEPS: usize = 5;
+
 /// Fits the luminance of samples; `None` where every descent ended in nonsense.
 ///
 /// A search for a coat also starts from the `bare` shape, where there is one.
@@ -358,6 +363,7 @@ pub(super) fn fit_shape(
     search: CoatSearch,
     unit: f64,
     bare: Option<&Shape>,
+    tell: Tell<'_>,
 ) -> Option<Shape> {
     let epsilon = DARK * unit;
     let near = NEAR_MIRROR_DEG.to_radians();
@@ -410,9 +416,15 @@ pub(super) fn fit_shape(
     if let Some(bare) = bare {
         starts.extend(starts_from(bare, search));
     }
+    // A finalist has as many samples as several starts.
+    let steps = Steps::new(starts.len() + FINALISTS * FINALIST_STEPS, tell);
     let mut found: Vec<Minimum> = starts
         .par_iter()
-        .map(|p| minimise(&quick, p, ROBUST, 40))
+        .map(|p| {
+            let minimum = minimise(&quick, p, ROBUST, 40);
+            steps.done(1);
+            minimum
+        })
         .collect();
     found.retain(|m| m.cost.is_finite());
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -421,10 +433,14 @@ pub(super) fn fit_shape(
         .iter()
         .filter(|m| m.cost <= 1.02 * best + 1e-9)
         .count();
-    let finalists = distinct(&found, 2);
+    let finalists = distinct(&found, FINALISTS);
     let mut last: Vec<Minimum> = finalists
         .par_iter()
-        .map(|m| minimise(&whole, &m.parameters, ROBUST, 40))
+        .map(|m| {
+            let minimum = minimise(&whole, &m.parameters, ROBUST, 40);
+            steps.done(FINALIST_STEPS);
+            minimum
+        })
         .collect();
     last.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let p = last.first().filter(|m| m.cost.is_finite())?;
@@ -554,7 +570,7 @@ mod tests {
             let truth = known(coat);
             let samples = measure(&Known(truth.clone()), 4000, 70.0, 3);
             let search = coat.map_or(CoatSearch::Bare, |c| CoatSearch::Index(c.0));
-            let found = fit_shape(&samples, search, 1.0, None).expect("a fit");
+            let found = fit_shape(&samples, search, 1.0, None, &|_| ()).expect("a fit");
             // Weights and Fresnel values trade against each other under a coat; what they reflect does not.
             let worst = worst(&found, &truth, &samples);
             assert!(worst < 0.02, "{coat:?}: {worst}, {found:?}");

@@ -6,8 +6,9 @@
 
 use rayon::prelude::*;
 
+use super::boxes::of_moments;
 use crate::color::LinearRgb;
-use crate::paint::{Flakes, Slice, center_of_mean, mean_color};
+use crate::paint::{Flakes, Slice, mean_color};
 
 /// Probability and corners of a finished cluster.
 type Boxed = (f64, [f32; 3], [f32; 3]);
@@ -56,9 +57,7 @@ fn reduce_slice(slice: &Slice<'_>, most: usize) -> Vec<Boxed> {
     let mut heaps: Vec<Heap> = (0..slice.probability.len())
         .map(|k| Heap::of(slice, k))
         .collect();
-    while heaps.len() > most {
-        merge_nearest(&mut heaps, most);
-    }
+    merge_nearest(&mut heaps, most);
     heaps.sort_by(|x, y| x.center[0].total_cmp(&y.center[0]));
     heaps.iter().map(Heap::boxed).collect()
 }
@@ -108,11 +107,8 @@ impl Heap {
         if let Some((lower, upper)) = self.own {
             return (self.mass, lower, upper);
         }
-        let half = self.variance.map(|v| (3.0 * v).sqrt());
-        let center = center_of_mean(half, self.linear, self.center);
-        #[allow(clippy::cast_possible_truncation)] // boxes are kept at texel precision
-        let corner = |side: f64| std::array::from_fn(|a| (center[a] + side * half[a]) as f32);
-        (self.mass, corner(-1.0), corner(1.0))
+        let (lower, upper) = of_moments(self.center, self.variance, self.linear);
+        (self.mass, lower, upper)
     }
 }
 
@@ -196,7 +192,28 @@ mod tests {
         for (x, y) in want.iter().zip(got) {
             assert!((x - y).abs() < 1e-5 * x.abs(), "{x} {y}");
         }
-        assert!(few.lower.windows(2).all(|w| w[0][0] <= w[1][0] + 60.0));
+        let middle: Vec<f64> = (0..50).map(|k| few.slice_at(0).center(k)[0]).collect();
+        // Boxes are ordered before their middles move to keep the mean in linear light: by a few Lab at most.
+        assert!(middle.windows(2).all(|w| w[0] <= w[1] + 6.0), "{middle:?}");
+    }
+
+    #[test]
+    fn merged_boxes_stay_within_the_bounds_of_a_paint() {
+        // Boxes as far extrapolation leaves them: at the bounds, and wide.
+        let mut many = flakes(40);
+        for k in 0..40 {
+            let end = if k % 2 == 0 { 2000.0 } else { -2000.0 };
+            (many.lower[k], many.upper[k]) = ([end; 3], [end; 3]);
+            if k % 5 == 0 {
+                many.lower[k] = [-2000.0; 3];
+                many.upper[k] = [2000.0; 3];
+            }
+        }
+        for most in [1, 2, 7] {
+            let few = reduce_clusters(&many, most);
+            let corners = few.lower.iter().chain(&few.upper).flatten();
+            assert!(corners.into_iter().all(|v| v.abs() <= 2000.0));
+        }
     }
 
     #[test]

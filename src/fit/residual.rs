@@ -14,7 +14,7 @@ use std::f64::consts::{PI, TAU};
 use rayon::prelude::*;
 
 use super::color_table::{Frame, transmission_from_air};
-use super::directions::{NEAR_MIRROR_DEG, Sample, TRUSTED_DEG, measure};
+use super::directions::{NEAR_MIRROR_DEG, Sample, measure};
 use super::lobes::DARK;
 use crate::color::{Lab, LinearRgb, ciede2000, luminance};
 use crate::measurement::{MeasuredBrdf, half_frame_pair};
@@ -153,9 +153,10 @@ fn percentiles(errors: impl Iterator<Item = f64>) -> Percentiles {
 }
 
 impl Judge {
-    /// Draws samples, keeps a fifth for judging, and finds the floor from the rest. `unit` scales what counts as dark.
-    pub fn new(measured: &dyn MeasuredBrdf, frame: Frame, unit: f64) -> Self {
-        let samples = measure(measured, SAMPLES, TRUSTED_DEG, 0x0F10_0A5E);
+    /// Draws samples within `cone_deg` of the normal, keeps a fifth for judging, and finds the floor from the rest.
+    /// `unit` scales what counts as dark.
+    pub fn new(measured: &dyn MeasuredBrdf, frame: Frame, cone_deg: f64, unit: f64) -> Self {
+        let samples = measure(measured, SAMPLES, cone_deg, 0x0F10_0A5E);
         let (train, test) = samples.split_at(samples.len() * 4 / 5);
         let neighbours = Neighbours::new(train);
         let test = test
@@ -306,6 +307,7 @@ fn ring_median(measured: &dyn MeasuredBrdf, wi: Direction, wo: Direction) -> Opt
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::directions::TRUSTED_DEG;
 
     struct OfHalfAngles;
 
@@ -318,7 +320,7 @@ mod tests {
 
     #[test]
     fn a_function_of_both_half_angles_has_hardly_a_floor() {
-        let judge = Judge::new(&OfHalfAngles, Frame::Air, 1.0);
+        let judge = Judge::new(&OfHalfAngles, Frame::Air, TRUSTED_DEG, 1.0);
         let [all, near] = judge.floor_errors();
         // Neighbours stand within 0.3° of each other, where the function changes by 0.5 %.
         assert!(all.p90 < 5e-3 && near.p90 < 5e-3, "{all:?} {near:?}");
@@ -336,7 +338,7 @@ mod tests {
 
     #[test]
     fn an_error_of_a_tenth_is_read_as_a_tenth() {
-        let judge = Judge::new(&OfHalfAngles, Frame::Air, 1.0);
+        let judge = Judge::new(&OfHalfAngles, Frame::Air, TRUSTED_DEG, 1.0);
         let residuals = judge.residuals(|wi, wo| {
             OfHalfAngles
                 .reflectance(wi, wo)

@@ -476,11 +476,12 @@ fn flakes(
     let [width, height] = &sides[..] else {
         return size.refuse("[width, height]");
     };
-    let side =
-        |f: &Field| Ok(u32::try_from(f.whole(1, limits.pixels.min(1 << 24))?).unwrap_or(u32::MAX));
+    let side = |f: &Field| {
+        Ok(u32::try_from(f.whole(1, limits.slice_pixels.min(1 << 24))?).unwrap_or(u32::MAX))
+    };
     let (width, height) = (side(width)?, side(height)?);
-    if u64::from(width) * u64::from(height) > limits.pixels {
-        return size.refuse(format!("at most {} pixels", limits.pixels));
+    if u64::from(width) * u64::from(height) > limits.slice_pixels {
+        return size.refuse(format!("at most {} pixels", limits.slice_pixels));
     }
     Ok(FlakesEntry {
         pattern,

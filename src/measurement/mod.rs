@@ -46,6 +46,9 @@ pub trait MeasuredBrdf: Sync {
     }
 }
 
+/// Names of all layouts.
+const LAYOUTS: &str = "rgl, mpi-2005, merl or package";
+
 /// How the bytes of a measurement are laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
@@ -57,6 +60,19 @@ pub enum Layout {
     Merl,
     /// Measured-paint package, a zip archive.
     Package,
+}
+
+impl Layout {
+    /// Its name, in requests and in provenances.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rgl => "rgl",
+            Self::Mpi2005 => "mpi-2005",
+            Self::Merl => "merl",
+            Self::Package => "package",
+        }
+    }
 }
 
 /// What a caller knows about a file that its bytes do not say.
@@ -86,7 +102,7 @@ pub enum MeasurementError {
     /// Neither the first bytes nor the length belong to a known layout.
     #[error(
         "the measurement has {bytes} bytes that begin with {begin:02x?}: that is no tensor file, package, MPI 2005 \
-         table (17496000 bytes and a header of 84) or MERL table (34992012 bytes); say which layout it has"
+         table (17496000 bytes and a header of 84) or MERL table (34992012 bytes); name its layout (--layout, or layout in a query), accepted are {LAYOUTS}"
     )]
     Unknown {
         /// Length of the input.
@@ -127,7 +143,7 @@ pub fn sniff(bytes: &[u8], options: &ReadOptions) -> Result<Layout, MeasurementE
         Ok(Layout::Rgl)
     } else if bytes.starts_with(b"PK") {
         Ok(Layout::Package)
-    } else if bytes.len() as u64 == mpi::VALUE_BYTES + header {
+    } else if bytes.len() as u64 == mpi::VALUE_BYTES.saturating_add(header) {
         Ok(Layout::Mpi2005)
     } else if bytes.len() == merl::FILE_BYTES || merl::begins_like_one(bytes) {
         Ok(Layout::Merl)
@@ -240,6 +256,19 @@ mod tests {
             sniff(b"PK\x03\x04", &ReadOptions::default()),
             Ok(Layout::Package)
         );
+    }
+
+    #[test]
+    fn a_header_longer_than_any_file_is_no_overflow() {
+        let options = ReadOptions {
+            header_bytes: Some(u64::MAX),
+            ..ReadOptions::default()
+        };
+        let error = BrdfMeasurement::read(b"hello", &options, &Limits::default());
+        assert!(matches!(
+            error,
+            Err(MeasurementError::Unknown { bytes: 5, .. })
+        ));
     }
 
     #[test]

@@ -151,8 +151,16 @@ impl<'a> Front<'a> {
     }
 }
 
+/// Most channels of a picture, of which three are read.
+const MOST_CHANNELS: usize = 16;
+
 /// Last of the compressions that are read: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A.
 const B44A: u8 = 7;
+
+/// Whether packed bytes can become so many: nothing packs denser than zlib's 1032:1, and no memory is for empty promises.
+const fn can_hold(packed: &[u8], bytes: usize) -> bool {
+    bytes / 1032 <= packed.len()
+}
 
 const CUT: PictureError = PictureError::Header("it is cut short");
 
@@ -276,7 +284,7 @@ fn read_channels(value: &mut Front) -> Result<Vec<(PixelType, Option<usize>)>, P
         let sampling = (value.i32().ok_or(CUT)?, value.i32().ok_or(CUT)?);
         if sampling != (1, 1)
             || (plane.is_some() && kind == PixelType::Uint)
-            || channels.len() >= 64
+            || channels.len() >= MOST_CHANNELS
         {
             return Err(PictureError::Kind {
                 found: "a picture with subsampled, integer or too many channels".into(),
@@ -326,9 +334,8 @@ impl Picture {
     ) -> Result<(), PictureError> {
         let header = Header::read(bytes, wanted, limits)?;
         (self.width, self.height) = (header.width, header.height);
-        // No compression packs a pixel's six bytes denser than zlib's 1032:1: no memory for empty promises.
         let pixels = header.width * header.height;
-        if pixels / 170 > bytes.len() {
+        if !can_hold(bytes, header.row_bytes().saturating_mul(header.height)) {
             return Err(PictureError::Header(
                 "it promises more pixels than its bytes can hold",
             ));
@@ -377,6 +384,8 @@ impl Picture {
                 self.place_plain(data, row, &header);
             } else if header.compression == 0 {
                 return Err(damaged("it has another length than its rows"));
+            } else if !can_hold(data, size) {
+                return Err(damaged("it promises more pixels than its bytes can hold"));
             } else {
                 scratch.packed.resize(size, 0);
                 match scratch
@@ -699,6 +708,59 @@ pub(super) mod tests {
                 accepted: 31
             })
         );
+    }
+
+    /// A header of `channels` float channels that promises `width x 4` pixels, and one block of ten bytes.
+    fn promise(width: i32, channels: u8) -> Vec<u8> {
+        let mut bytes = vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
+        let mut attribute = |name: &str, kind: &str, value: &[u8]| {
+            bytes.extend([name.as_bytes(), b"\0", kind.as_bytes(), b"\0"].concat());
+            bytes.extend(u32::try_from(value.len()).expect("short").to_le_bytes());
+            bytes.extend(value);
+        };
+        let mut list = Vec::new();
+        for k in 0..channels {
+            list.push(
+                [b'R', b'G', b'B']
+                    .get(usize::from(k))
+                    .copied()
+                    .unwrap_or(b'a' + k),
+            );
+            list.extend([0, 2, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
+        }
+        list.push(0);
+        attribute("channels", "chlist", &list);
+        attribute("compression", "compression", &[3]);
+        let window = [0, 0, width - 1, 3].map(i32::to_le_bytes).concat();
+        attribute("dataWindow", "box2i", &window);
+        bytes.push(0);
+        let block = bytes.len() as u64 + 8;
+        bytes.extend(block.to_le_bytes());
+        bytes.extend([0, 0, 0, 0, 10, 0, 0, 0]);
+        bytes.extend([0; 10]);
+        bytes
+    }
+
+    #[test]
+    fn no_memory_is_taken_for_what_the_bytes_cannot_hold() {
+        for (width, channels) in [(16_777_215, 16), (16_777_215, 3), (4096, 16)] {
+            let bytes = promise(width, channels);
+            let mut scratch = PictureScratch::default();
+            let error = Picture::read_exr(&bytes, None, &Limits::default(), &mut scratch)
+                .expect_err("an empty promise");
+            assert!(error.to_string().contains("bytes can hold"), "{error}");
+            assert!(scratch.packed.is_empty());
+        }
+        // A file long enough for the picture, a block far too short for its rows.
+        let mut bytes = promise(16_384, 16);
+        bytes.resize(bytes.len() + (4 << 20), 0);
+        let error = read(&bytes, None).expect_err("an empty promise");
+        assert!(
+            matches!(error, PictureError::Block { block: 0, .. }),
+            "{error}"
+        );
+        let error = read(&promise(16, 17), None).expect_err("many channels");
+        assert!(matches!(error, PictureError::Kind { .. }), "{error}");
     }
 
     #[test]

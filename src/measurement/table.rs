@@ -301,6 +301,7 @@ mod tests {
     });
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn exchanging_light_and_viewer_changes_nothing(
             h in 0.01..0.7_f64, d in 0.01..0.7_f64, p in 0.0..6.2_f64,

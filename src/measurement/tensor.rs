@@ -299,6 +299,7 @@ pub(super) mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn scrambled_bytes_never_panic(scramble in prop::collection::vec(any::<(u16, u8)>(), 1..40)) {
             let mut file = tensor_file(&[("a", &[2], &[1.0, -2.0]), ("b", &[1, 3], &[4.0, 5.0, 6.0])]);

@@ -13,6 +13,8 @@
 //!
 //! Places and order come from 32-bit integer hashing and the tile has no seam; a shader reads it from a texture.
 
+use std::sync::OnceLock;
+
 use super::flakes::FlakeTexture;
 use super::sparkle::{mix, unit};
 
@@ -28,15 +30,36 @@ impl RandomTexture {
     /// Texels along a side of the tile that pictures and bundles share.
     pub const TILE: u32 = 256;
 
+    /// How many tiles [`RandomTexture::of`] chooses from.
+    pub const KINDS: usize = KINDS;
+
     /// The tile of these flakes: the one that pictures draw and bundles carry.
+    ///
+    /// A tile holds a whole number of buckets, so that paints of similar grain share one: each of the
+    /// [`RandomTexture::KINDS`] is made when it is first asked for and kept, 256 KiB apiece.
     #[must_use]
-    pub fn of(texture: &FlakeTexture) -> Self {
-        Self::new(
-            Self::TILE,
-            Self::TILE,
-            cell_spacing(texture.grain_um / texture.texel_um),
-            1,
-        )
+    pub fn of(texture: &FlakeTexture) -> &'static Self {
+        static TILES: [OnceLock<RandomTexture>; KINDS] = [const { OnceLock::new() }; KINDS];
+        let kind = Self::kind(texture);
+        TILES[kind].get_or_init(|| {
+            let spacing = if kind == 0 {
+                0.0
+            } else {
+                f64::from(Self::TILE) / (2.0 * kind as f64)
+            };
+            Self::new(Self::TILE, Self::TILE, spacing, 1)
+        })
+    }
+
+    /// Which of the tiles these flakes get, below [`RandomTexture::KINDS`]: 0 for texels that are cells of their own,
+    /// else the buckets along a side.
+    #[must_use]
+    pub fn kind(texture: &FlakeTexture) -> usize {
+        let spacing = cell_spacing(texture.grain_um / texture.texel_um);
+        if spacing.is_nan() || spacing < LEAST_SPACING {
+            return 0;
+        }
+        (buckets_along(Self::TILE, spacing) as usize).min(KINDS - 1)
     }
 
     /// A tile of `width x height` texels whose cells are `spacing` texels apart (see [`cell_spacing`]).
@@ -94,6 +117,16 @@ impl RandomTexture {
     }
 }
 
+/// Buckets along a side: one holds four cells, so it is two spacings wide.
+fn buckets_along(size: u32, spacing: f64) -> u32 {
+    (f64::from(size) / (2.0 * spacing))
+        .round()
+        .clamp(1.0, 4.0 * f64::from(size)) as u32
+}
+
+/// Buckets along a shared tile's side at [`LEAST_SPACING`], and the tile without buckets.
+const KINDS: usize = 234;
+
 /// Points in each bucket.
 const PER_BUCKET: u32 = 4;
 
@@ -110,15 +143,10 @@ struct Buckets {
 
 impl Buckets {
     fn new(width: u32, height: u32, spacing: f64, seed: u32) -> Self {
-        // A bucket holds four cells: it is two spacings wide.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        // clamped to 1..=4 per texel
-        let count = |size: u32| {
-            (f64::from(size) / (2.0 * spacing))
-                .round()
-                .clamp(1.0, 4.0 * f64::from(size)) as u32
-        };
-        let (columns, rows) = (count(width), count(height));
+        let (columns, rows) = (
+            buckets_along(width, spacing),
+            buckets_along(height, spacing),
+        );
         Self {
             columns,
             rows,
@@ -322,6 +350,21 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn shared_tiles_are_those_of_their_spacing() {
+        let texture = |grain: f64| FlakeTexture {
+            texel_um: 1.0,
+            grain_um: grain,
+            lifetime_deg: [1.0; 2],
+            persistence_deg: [1.0; 2],
+        };
+        for grain in [0.4, 0.5, 0.504, 0.6, 1.0, 2.7, 40.0, 1e6] {
+            let own = RandomTexture::new(256, 256, cell_spacing(grain), 1);
+            assert!(*RandomTexture::of(&texture(grain)) == own, "{grain}");
+        }
+        assert!(buckets_along(RandomTexture::TILE, LEAST_SPACING) as usize == KINDS - 1);
     }
 
     #[test]

@@ -144,6 +144,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn it_equals_the_textbook_form_where_that_does_not_cancel(cos in 0.01..=1.0_f64, ior in 1.2..=4.0_f64) {
             let inner = (1.0 - (1.0 - cos * cos) / (ior * ior)).sqrt();

@@ -44,6 +44,14 @@ pub enum ContainerError {
         /// What the JSON reader says.
         source: serde_json::Error,
     },
+    /// More bytes than the arrays have.
+    #[error("the .{kind} file has {bytes} bytes after its last array")]
+    Trailing {
+        /// `paint` or `blend`.
+        kind: &'static str,
+        /// How many.
+        bytes: usize,
+    },
     /// An array is shorter than its count.
     #[error("array {index} of the .{kind} file is cut short")]
     Array {
@@ -204,6 +212,21 @@ impl Reader<'_> {
         self.rest = rest;
         self.index += 1;
         Ok(bytemuck::pod_collect_to_vec(values))
+    }
+
+    /// Checks that all was read.
+    ///
+    /// # Errors
+    ///
+    /// [`ContainerError::Trailing`] for bytes after the last array.
+    pub fn end(self) -> Result<(), ContainerError> {
+        if self.rest.is_empty() {
+            return Ok(());
+        }
+        Err(ContainerError::Trailing {
+            kind: self.kind,
+            bytes: self.rest.len(),
+        })
     }
 }
 

@@ -6,12 +6,15 @@ use super::container::{Container, ContainerError, Writer};
 use super::energy::EnergyCertificate;
 use super::{
     AngleGrid, CarPaint, ClusteringError, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes,
-    Limits, Lobe, PaintError, Percentiles,
+    Limits, Lobe, PaintError, Percentiles, ReadingResiduals, Realisation,
 };
 use crate::color::{Lab, LinearRgb};
 
 /// Latest version of the file that is read and the one that is written.
 pub const VERSION: u32 = 1;
+
+/// Most characters of a name.
+pub const NAME_CHARACTERS: usize = 200;
 
 /// Where a paint comes from, kept and given back untouched.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -25,6 +28,9 @@ pub struct Provenance {
     /// Whether the flakes were simulated instead of measured.
     #[serde(default)]
     pub simulated_flakes: bool,
+    /// Of which blend it is a realisation, where it is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub realisation: Option<Realisation>,
     /// What else the source said about itself: license, instrument, maker, color code, date.
     #[serde(default, skip_serializing_if = "std::collections::BTreeMap::is_empty")]
     pub notes: std::collections::BTreeMap<String, String>,
@@ -76,6 +82,8 @@ pub struct PaintFile {
     pub clustering: Option<Clustering>,
     /// How well the base fits its measurement, where it was fitted.
     pub residuals: Option<FitResiduals>,
+    /// How far the paint is from the multi-angle readings that came with its measurement, where some did.
+    pub readings: Option<ReadingResiduals>,
     /// Energy certificate.
     pub energy: EnergyCertificate,
     /// What the user should know: dirty data, averaged azimuths, energy above 1, clamped values.
@@ -89,6 +97,9 @@ pub enum PaintFileError {
     /// The file as a file.
     #[error(transparent)]
     Container(#[from] ContainerError),
+    /// Its name.
+    #[error("the name in the .paint file has {0} characters, accepted are 1 to {NAME_CHARACTERS}")]
+    Name(usize),
     /// The parameters in it.
     #[error("the .paint file holds no valid paint: {0}")]
     Paint(#[from] PaintError),
@@ -101,6 +112,8 @@ struct Header {
     physical: PhysicalHeader,
     clustering: Option<Clustering>,
     residuals: Option<FitResiduals>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    readings: Option<ReadingResiduals>,
     energy: EnergyCertificate,
     warnings: Vec<String>,
 }
@@ -195,6 +208,7 @@ impl PaintFile {
             physical: PhysicalHeader::of(&self.paint),
             clustering: self.clustering.clone(),
             residuals: self.residuals.clone(),
+            readings: self.readings.clone(),
             energy: self.energy.clone(),
             warnings: self.warnings.clone(),
         };
@@ -235,6 +249,11 @@ impl PaintFile {
                 texture: flakes.texture,
             }),
         };
+        reader.end()?;
+        let length = header.name.chars().count();
+        if !(1..=NAME_CHARACTERS).contains(&length) {
+            return Err(PaintFileError::Name(length));
+        }
         let (coat, diffuse, lobes) = (physical.coat, physical.diffuse, physical.lobes);
         let paint = CarPaint {
             coat,
@@ -250,6 +269,7 @@ impl PaintFile {
             paint,
             clustering: header.clustering,
             residuals: header.residuals,
+            readings: header.readings,
             energy: header.energy,
             warnings: header.warnings,
         })

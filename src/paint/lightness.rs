@@ -168,6 +168,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn quantiles_and_shares_undo_each_other(
             boxes in prop::collection::vec((0.01..1.0_f64, -50.0..100.0_f32, 0.1..80.0_f32), 1..30), p in 0.01..0.99_f64,

@@ -5,8 +5,12 @@
 pub struct Limits {
     /// Bytes of an upload, and of what it unpacks to.
     pub bytes: u64,
+    /// Bytes of a bare table or tensor, which is held in memory as a whole.
+    pub table_bytes: u64,
     /// Pixels of one picture.
     pub pixels: u64,
+    /// Pixels of one flake slice; every core holds one at a time.
+    pub slice_pixels: u64,
     /// Entries of an archive.
     pub entries: usize,
     /// Angles of one axis of a grid.
@@ -27,7 +31,9 @@ impl Default for Limits {
     fn default() -> Self {
         Self {
             bytes: 4 << 30,
+            table_bytes: 512 << 20,
             pixels: 64 << 20,
+            slice_pixels: 4 << 20,
             entries: 20_000,
             angles: 181,
             lobes: 8,

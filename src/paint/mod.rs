@@ -23,6 +23,7 @@ mod flakes;
 mod lightness;
 mod limits;
 mod lobe;
+mod realisation;
 mod reflectance;
 mod residuals;
 mod sparkle;
@@ -37,14 +38,18 @@ pub use color_table::{ColorTable, ColorTableError, at_angles};
 pub use container::{Container, ContainerError, Reader, Writer};
 pub use direction::{ASPECULAR_DEG, Direction, HalfAngles, half_angles, instrument_pairs};
 pub use energy::{EnergyCertificate, certify};
-pub use file::{Clustering, PaintFile, PaintFileError, Provenance};
+pub use file::{Clustering, NAME_CHARACTERS, PaintFile, PaintFileError, Provenance};
 pub use flakes::{FlakeTexture, Flakes, Slice};
 pub use lightness::LightnessMixture;
 pub use limits::Limits;
 pub use lobe::Lobe;
+pub use realisation::{Clamp, Realisation};
 pub use reflectance::{Chi, Reflectance, Terms};
-pub use residuals::{ClusteringError, FitResiduals, InstrumentError, LuminanceError, Percentiles};
-pub use sparkle::{FlakeSampler, TexelDraw};
+pub use residuals::{
+    ClusteringError, FitResiduals, InstrumentError, LuminanceError, Percentiles, ReadingError,
+    ReadingResiduals,
+};
+pub use sparkle::{FlakeSampler, TexelDraw, cumulative};
 pub use validate::{MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError};
 
 use crate::color::LinearRgb;

@@ -30,6 +30,32 @@ pub struct LuminanceError {
     pub floor_p90: f64,
 }
 
+/// How far a paint is from the readings that came with its measurement, flakes at their mean.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReadingResiduals {
+    /// Angle of the light from the normal, degrees.
+    pub illumination_deg: f64,
+    /// Angle by angle, in the order of the readings.
+    pub rows: Vec<ReadingError>,
+    /// Median CIEDE2000.
+    pub median: f64,
+    /// Largest CIEDE2000.
+    pub worst: f64,
+    /// Whether the readings were made under another light or observer than D65 and 2°, and compared as they are.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub approximate: bool,
+}
+
+/// Color error against one reading.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReadingError {
+    /// Aspecular angle, degrees.
+    pub aspecular_deg: f64,
+    /// CIEDE2000 between paint and reading.
+    pub delta_e_2000: f64,
+}
+
 /// Color error at one instrument geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InstrumentError {

@@ -108,20 +108,30 @@ struct RootBox {
 /// Parts of the unit interval in the guide to the clusters of a slice.
 const GUIDED: u16 = 64;
 
+/// Cumulative probabilities of all clusters, slice by slice, as draws compare them.
+#[must_use]
+#[allow(clippy::cast_possible_truncation)] // texel precision is f32
+pub fn cumulative(flakes: &Flakes) -> Vec<f32> {
+    let mut out = Vec::with_capacity(flakes.clusters());
+    for k in 0..flakes.slices() {
+        let mut sum = 0.0;
+        out.extend(flakes.slice_at(k).probability.iter().map(|p| {
+            sum += p;
+            sum as f32
+        }));
+    }
+    out
+}
+
 impl<'a> FlakeSampler<'a> {
     /// Prepares flakes: one pass over the clusters.
     #[must_use]
     #[allow(clippy::cast_possible_truncation)] // texel precision is f32
     pub fn new(flakes: &'a Flakes) -> Self {
-        let mut cumulative: Vec<f32> = Vec::with_capacity(flakes.clusters());
+        let cumulative = cumulative(flakes);
         let mut guide = Vec::with_capacity(flakes.slices() * usize::from(GUIDED));
-        for k in 0..flakes.slices() {
-            let (mut sum, first) = (0.0, cumulative.len());
-            cumulative.extend(flakes.slice_at(k).probability.iter().map(|p| {
-                sum += p;
-                sum as f32
-            }));
-            let slice = &cumulative[first..];
+        for ends in flakes.offsets.windows(2) {
+            let slice = &cumulative[ends[0] as usize..ends[1] as usize];
             let part = |j: u16| f32::from(j) / f32::from(GUIDED);
             guide.extend((0..GUIDED).map(|j| {
                 slice
@@ -160,12 +170,6 @@ impl<'a> FlakeSampler<'a> {
                 column([0.0, 0.0, D65_2.z]),
             ],
         }
-    }
-
-    /// Cumulative probabilities of all clusters, slice by slice, as draws compare them.
-    #[must_use]
-    pub fn cumulative(&self) -> &[f32] {
-        &self.cumulative
     }
 
     /// Size and persistence of these flakes.

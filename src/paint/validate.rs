@@ -116,6 +116,15 @@ impl CarPaint {
                 )?;
             }
         }
+        for value in self.color_table.overall().to_array() {
+            within(
+                || "color_table.overall".into(),
+                value,
+                -MAX_LAB,
+                MAX_LAB,
+                "-2000 to 2000",
+            )?;
+        }
         self.flakes
             .as_ref()
             .map_or(Ok(()), |flakes| flakes.validate(limits))
@@ -201,7 +210,10 @@ impl Flakes {
                     accepted,
                 });
             }
-            self.validate_slice(k, count)?;
+        }
+        // Only now that all offsets ascend does every slice lie within the lists.
+        for k in 0..self.slices() {
+            self.validate_slice(k)?;
         }
         let t = &self.texture;
         within(
@@ -230,7 +242,7 @@ impl Flakes {
         Ok(())
     }
 
-    fn validate_slice(&self, k: usize, count: usize) -> Result<(), PaintError> {
+    fn validate_slice(&self, k: usize) -> Result<(), PaintError> {
         let slice = self.slice_at(k);
         let mut sum = 0.0;
         for (c, &p) in slice.probability.iter().enumerate() {
@@ -244,7 +256,7 @@ impl Flakes {
             sum += p;
         }
         #[allow(clippy::cast_precision_loss)] // at most a few thousand
-        let rounding = 1e-12 * count as f64;
+        let rounding = 1e-12 * slice.probability.len() as f64;
         if (sum - 1.0).abs() > rounding {
             let field = format!("flakes.slices[{k}].probability");
             return Err(PaintError::Range {
@@ -273,5 +285,42 @@ impl Flakes {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paint::{AngleGrid, ColorTable, FlakeTexture};
+
+    #[test]
+    fn offsets_that_do_not_ascend_are_refused_before_a_slice_is_read() {
+        for offsets in [vec![0, 4096, 2, 4], vec![0, 2, 1, 4], vec![0, 0, 2, 4]] {
+            let paint = CarPaint {
+                coat: None,
+                diffuse: [0.1; 3],
+                lobes: vec![],
+                color_table: ColorTable::white(),
+                flakes: Some(Flakes {
+                    theta_h: AngleGrid::new(vec![0.0, 10.0, 20.0]).expect("ascending"),
+                    theta_d: AngleGrid::single(),
+                    offsets,
+                    probability: vec![1.0; 4],
+                    lower: vec![[0.0; 3]; 4],
+                    upper: vec![[1.0; 3]; 4],
+                    texture: FlakeTexture {
+                        texel_um: 20.0,
+                        grain_um: 20.0,
+                        lifetime_deg: [5.0; 2],
+                        persistence_deg: [5.0; 2],
+                    },
+                }),
+            };
+            let error = paint.validate(&Limits::default()).expect_err("refused");
+            assert!(
+                matches!(&error, PaintError::Count { field, .. } if field.starts_with("flakes.slices[")),
+                "{error}"
+            );
+        }
     }
 }

@@ -33,6 +33,14 @@ pub enum FilmError {
     /// The EXR encoder refused.
     #[error("EXR: {0}")]
     Exr(String),
+    /// A pixel that no file may hold.
+    #[error("pixel {x}, {y} is not a number")]
+    NotANumber {
+        /// Column, from the left.
+        x: usize,
+        /// Row, from the top.
+        y: usize,
+    },
     /// Pictures of a sheet differ in size, or there are none.
     #[error("a sheet needs pictures of one size: {0}")]
     Sheet(String),
@@ -105,13 +113,26 @@ impl Film {
         Ok(bytes)
     }
 
-    /// The picture as EXR bytes, channels R, G, B, half floats, not exposed.
+    /// The picture as EXR bytes, channels R, G, B, half floats, not exposed. What a half cannot hold is held at its
+    /// largest, and below its smallest normal number a pixel is black.
     ///
     /// # Errors
     ///
-    /// [`FilmError::Exr`] from the encoder.
+    /// [`FilmError::NotANumber`] for such a pixel, [`FilmError::Exr`] from the encoder.
     pub fn to_exr(&self) -> Result<Vec<u8>, FilmError> {
-        let at = |k: usize| self.pixels[k].map(|v| f16::from_f32(v.clamp(-65504.0, 65504.0)));
+        let wrong = |pixel: &Vec3| pixel.iter().any(|v| v.is_nan());
+        if let Some(k) = self.pixels.iter().position(wrong) {
+            let width = self.width as usize;
+            return Err(FilmError::NotANumber {
+                x: k % width,
+                y: k / width,
+            });
+        }
+        let half = |v: f32| {
+            let half = f16::from_f32(v.clamp(-65504.0, 65504.0));
+            if half.is_normal() { half } else { f16::ZERO }
+        };
+        let at = |k: usize| self.pixels[k].map(half);
         write_exr(self.width, self.height, |k| at(k).into())
     }
 
@@ -228,6 +249,19 @@ pub(super) mod tests {
             .map(|k| [f32::from(k) * 0.25, 1.0 / (f32::from(k) + 1.0), -0.1])
             .collect();
         Film::new(4, 3, 1.0, pixels)
+    }
+
+    #[test]
+    fn no_half_in_a_file_is_no_number_or_neither_zero_nor_normal() {
+        let nan = Film::new(2, 1, 1.0, vec![[0.0; 3], [1.0, f32::NAN, 0.0]]);
+        let refused = nan.to_exr().expect_err("refused");
+        assert_eq!(refused.to_string(), "pixel 1, 0 is not a number");
+        let hard = [[1e30, -f32::INFINITY, 65519.0], [1e-5, -6e-5, 6.2e-5]];
+        let bytes = Film::new(2, 1, 1.0, hard.to_vec()).to_exr();
+        let (_, _, pixels) = read_exr(&bytes.expect("encodes"));
+        assert_eq!(pixels[0], [65504.0, -65504.0, 65504.0]);
+        assert_eq!(pixels[1][..2], [0.0, 0.0]);
+        assert!((pixels[1][2] / 6.2e-5 - 1.0).abs() < 1e-3);
     }
 
     #[test]

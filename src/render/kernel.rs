@@ -328,6 +328,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn the_kernel_says_what_the_reflectance_says(
             iz in 0.02..1.0_f64, oz in 0.02..1.0_f64, turn in 0.0..std::f64::consts::TAU, ior in 1.0..2.5_f64, rough in 0.0..0.3_f64,
@@ -358,6 +359,71 @@ mod tests {
             prop_assert!(get(&got.f, 0).iter().all(|v| v.is_finite()));
             prop_assert!(got.density.0[0].is_finite());
         }
+    }
+
+    /// χ² over 8 bands of height and 8 of azimuth: how often directions are drawn against the integral of the density.
+    #[test]
+    fn drawn_directions_fall_where_their_density_says() {
+        for (coat, roughness) in [(true, 0.0), (true, 0.08), (false, 0.0)] {
+            let coat = coat.then_some(Coat {
+                ior: 1.5,
+                roughness,
+                thickness_um: None,
+            });
+            if coat.is_some() {
+                assert_drawn_by_density::<true>(&paint(coat));
+            } else {
+                assert_drawn_by_density::<false>(&paint(coat));
+            }
+        }
+    }
+
+    fn assert_drawn_by_density<const COATED: bool>(paint: &CarPaint) {
+        const DRAWS: u32 = 1 << 16;
+        let mut kernel = Kernel::new(paint);
+        kernel.draws = true;
+        let view = kernel.view::<COATED>(single(direction(0.7, 0.0)));
+        let points = super::super::points::Points::of_pixel(0, 0, DRAWS, 5);
+        let mut counts = [0.0_f64; 64];
+        for k in 0..DRAWS {
+            let (pick, pair) = (points.pair(k, 1)[0], points.pair(k, 0));
+            let Some(light) = kernel.sample::<COATED>(&view, 0, pick, pair) else {
+                continue;
+            };
+            let turn = light[1].atan2(light[0]) / TAU;
+            let band = ((light[2] * 8.0) as usize).min(7);
+            counts[8 * band + ((turn - turn.floor()) * 8.0).min(7.0) as usize] += 1.0;
+        }
+        let (mut statistic, mut cells) = (0.0, 0.0);
+        for (cell, count) in counts.iter().enumerate() {
+            let mut density = 0.0;
+            let steps = 60_u32;
+            for k in 0..steps * steps {
+                let part = |k: u32| (f64::from(k) + 0.5) / f64::from(steps);
+                let z = ((cell / 8) as f64 + part(k / steps)) / 8.0;
+                let turn = ((cell % 8) as f64 + part(k % steps)) / 8.0 * std::f64::consts::TAU;
+                let light = single(direction(z, turn));
+                let answer = kernel.evaluate::<COATED, false>(&view, light, &[0; WIDTH], None);
+                density += f64::from(answer.density.0[0]);
+            }
+            let solid = std::f64::consts::TAU / 64.0 / f64::from(steps * steps);
+            let expected = density * solid * f64::from(DRAWS);
+            if expected >= 5.0 {
+                statistic += (count - expected).powi(2) / expected;
+                cells += 1.0;
+            } else {
+                assert!(
+                    *count < 30.0,
+                    "{count} draws where {expected} were expected"
+                );
+            }
+        }
+        // k + 6 √(2k); the midpoint rule on lobes of a few of its steps adds no more than that again.
+        let limit: f64 = 2.0 * (cells + 6.0 * f64::sqrt(2.0 * cells));
+        assert!(
+            cells > 20.0 && statistic < limit,
+            "χ² {statistic} of {cells} cells"
+        );
     }
 
     /// Directions drawn by the kernel, weighted by one over their stated density, must cover the hemisphere.

@@ -33,7 +33,7 @@ pub(super) struct Shader<'a> {
 }
 
 struct Texture {
-    tile: RandomTexture,
+    tile: &'static RandomTexture,
     texels_per_unit: f32,
     /// Side of a cell, texels, at least 1.
     cell: f32,

@@ -80,6 +80,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn more_light_is_never_darker(r in 0.0..20.0_f32, g in 0.0..20.0_f32, b in 0.0..20.0_f32) {
             let (dim, bright) = (neutral([r, g, b]), neutral([r * 1.01, g * 1.01, b * 1.01]));

@@ -10,6 +10,7 @@ use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use serde::Serialize;
 
+use super::problem::Problem;
 use crate::store::{BlobBytes, CachedResult, Hash};
 
 /// How long an answer may be kept by whoever gets it.
@@ -17,6 +18,8 @@ use crate::store::{BlobBytes, CachedResult, Hash};
 pub enum Keep {
     /// For ever: the address is a hash of what made it.
     ForEver,
+    /// By the caller alone, as long as it is asked again whether it is still there.
+    Own,
     /// As long as it is asked again whether it changed.
     Revalidated,
     /// Not at all.
@@ -30,6 +33,8 @@ pub struct Answer {
     headers: HeaderMap,
     body: Body,
     stages: Vec<(&'static str, Duration)>,
+    /// Why it is none after all.
+    failed: Option<Problem>,
 }
 
 /// Time spent in the stages of an answer, for `Server-Timing`.
@@ -43,6 +48,7 @@ impl Answer {
         headers.insert(header::ETAG, etag(hash));
         let keep = match keep {
             Keep::ForEver => "public, max-age=31536000, immutable",
+            Keep::Own => "private, no-cache",
             Keep::Revalidated => "no-cache",
             Keep::Never => "no-store",
         };
@@ -52,6 +58,7 @@ impl Answer {
             headers,
             body,
             stages: Vec::new(),
+            failed: None,
         }
     }
 
@@ -70,13 +77,8 @@ impl Answer {
 
     /// An answer of a blob, a piece at a time.
     #[must_use]
-    pub fn blob(media_type: &'static str, hash: Hash, blob: BlobBytes) -> Self {
-        let mut answer = Self::new(
-            media_type,
-            hash,
-            Keep::ForEver,
-            Body::from_stream(blob.pieces),
-        );
+    pub fn blob(media_type: &'static str, hash: Hash, blob: BlobBytes, keep: Keep) -> Self {
+        let mut answer = Self::new(media_type, hash, keep, Body::from_stream(blob.pieces));
         answer
             .headers
             .insert(header::CONTENT_LENGTH, HeaderValue::from(blob.length));
@@ -86,11 +88,13 @@ impl Answer {
     /// A JSON answer.
     #[must_use]
     pub fn json(value: &impl Serialize, keep: Keep) -> Self {
-        Self::bytes(
-            "application/json",
-            serde_json::to_vec(value).unwrap_or_default(),
-            keep,
-        )
+        match serde_json::to_vec(value) {
+            Ok(bytes) => Self::bytes("application/json", bytes, keep),
+            Err(error) => Self {
+                failed: Some(Problem::internal(error)),
+                ..Self::bytes("application/json", Bytes::new(), Keep::Never)
+            },
+        }
     }
 
     /// With another status than 200.
@@ -141,6 +145,9 @@ fn etag(hash: Hash) -> HeaderValue {
 
 impl IntoResponse for Answer {
     fn into_response(self) -> Response {
+        if let Some(problem) = self.failed {
+            return problem.into_response();
+        }
         let mut response = HttpResponse::new(self.body);
         *response.status_mut() = self.status;
         *response.headers_mut() = self.headers;

@@ -16,13 +16,14 @@ use super::ids;
 use super::metrics::Metrics;
 use super::problem::{Kind, Problem};
 use super::runner::Jobs;
+use super::watchers::Watchers;
 use super::workbench::Workbench;
 use super::works::{Thing, Works};
 use crate::blend::Blend;
 use crate::paint::PaintFile;
 use crate::store::{
     BlendRecord, Blobs, CachedResult, Catalogue, FolderBlobs, Hash, PaintRecord, ResultCache,
-    SqliteCatalogue, StoreError,
+    SqliteCatalogue, StoreError, Visibility,
 };
 
 /// A running service, shared by its handlers.
@@ -45,6 +46,8 @@ pub struct Shared {
     pub bench: Workbench,
     /// Jobs under way.
     pub jobs: Jobs,
+    /// Who waits for pictures.
+    pub watchers: Watchers,
     /// Counts.
     pub metrics: Metrics,
     /// Read while a blob is written and not yet named by a record, written while unnamed blobs are removed.
@@ -72,6 +75,8 @@ pub struct Shelved {
     pub file: Hash,
     /// Hash of its physical content.
     pub content: Hash,
+    /// Whether lists show it.
+    pub visibility: Visibility,
     /// Blob of its measurement, where there was one.
     pub measurement: Option<Hash>,
 }
@@ -140,6 +145,7 @@ impl App {
             results,
             bench: Workbench::new(processors, config.most_waiting),
             jobs: Jobs::new(processors.div_ceil(2), config.most_jobs),
+            watchers: Watchers::default(),
             metrics: Metrics::new(),
             removal: RwLock::new(()),
             shelf,
@@ -180,7 +186,7 @@ impl App {
         &self,
         id: &str,
         prefix: &str,
-        read: impl FnOnce() -> F,
+        read: impl Fn() -> F,
     ) -> Result<Option<Arc<Shelved>>, Problem>
     where
         F: Future<Output = Result<Option<Shelved>, Problem>>,
@@ -191,20 +197,38 @@ impl App {
         if let Some(shelved) = self.shelf.get(id).await {
             return Ok(Some(shelved));
         }
-        // Nothing is put back on the shelf while it is being forgotten.
-        let _reading = self.removal.read().await;
-        let shelve = async { read().await.map_err(Some)?.map(Arc::new).ok_or(None) };
-        match self.shelf.try_get_with_by_ref(id, shelve).await {
-            Ok(shelved) => Ok(Some(shelved)),
-            Err(problem) => (*problem).clone().map_or(Ok(None), Err),
+        loop {
+            let shelve = async { read().await.map_err(Some)?.map(Arc::new).ok_or(None) };
+            let shelved = match self.shelf.try_get_with_by_ref(id, shelve).await {
+                Ok(shelved) => shelved,
+                Err(problem) => return (*problem).clone().map_or(Ok(None), Err),
+            };
+            // What was forgotten or changed while it was read does not stay on the shelf.
+            let _reading = self.removal.read().await;
+            let on_record = match &shelved.thing {
+                Thing::Paint(_) => self.catalogue.paint(id).await?.map(|of| of.visibility),
+                Thing::Blend(_) => self.catalogue.blend(id).await?.map(|_| shelved.visibility),
+            };
+            if on_record == Some(shelved.visibility) {
+                return Ok(Some(shelved));
+            }
+            self.shelf.invalidate(id).await;
+            if on_record.is_none() {
+                return Ok(None);
+            }
         }
     }
 
     async fn read_paint(&self, id: &str) -> Result<Option<Shelved>, Problem> {
-        let Some(record) = self.catalogue.paint(id).await? else {
-            return Ok(None);
+        let (record, bytes) = {
+            // Held while the blob is fetched, not while a place to compute is waited for.
+            let _reading = self.removal.read().await;
+            let Some(record) = self.catalogue.paint(id).await? else {
+                return Ok(None);
+            };
+            let bytes = self.stored(record.paint).await?;
+            (record, bytes)
         };
-        let bytes = self.stored(record.paint).await?;
         let (limits, works) = (self.config.limits, Arc::clone(&self.works));
         let shelve = move || -> Result<Shelved, Problem> {
             let file = PaintFile::from_bytes(&bytes, &limits).map_err(Problem::internal)?;
@@ -217,6 +241,7 @@ impl App {
                 paint: file,
                 measurement,
                 content,
+                visibility,
                 ..
             } = record;
             Ok(Shelved {
@@ -226,6 +251,7 @@ impl App {
                 document,
                 file,
                 content,
+                visibility,
                 measurement,
             })
         };
@@ -263,6 +289,7 @@ impl App {
                 document,
                 file,
                 content: file,
+                visibility: Visibility::default(),
                 measurement: None,
             })
         };
@@ -321,6 +348,7 @@ impl App {
             measurement,
             paint,
             content,
+            visibility: Visibility::default(),
         };
         self.catalogue.add_paint(&record).await?;
         Ok(())
@@ -342,6 +370,21 @@ impl App {
         for blob in gone.measurement.into_iter().chain([gone.paint]) {
             self.forget_unnamed(blob).await?;
         }
+        Ok(())
+    }
+
+    /// Publishes a paint or makes it private.
+    ///
+    /// # Errors
+    ///
+    /// [`Kind::UnknownPaint`] when there is none.
+    pub async fn show_paint(&self, id: &str, visibility: Visibility) -> Result<(), Problem> {
+        // Nobody reads the record before and shelves it after.
+        let _changing = self.removal.write().await;
+        if !self.catalogue.show_paint(id, visibility).await? {
+            return Err(unknown_paint(id));
+        }
+        self.shelf.invalidate(id).await;
         Ok(())
     }
 

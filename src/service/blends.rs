@@ -13,6 +13,7 @@ use super::answer::{Answer, Keep};
 use super::app::{App, BlendOptions, Shelved};
 use super::documents::BlendDocument;
 use super::extract::{Address, Json, NoQuery};
+use super::idempotency::Idempotency;
 use super::ids;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::profile::{ProfileDocument, ProfileText};
@@ -60,7 +61,8 @@ struct BlendRequest {
 /// follow that order, of the same correspondence.
 #[utoipa::path(
     post, operation_id = "create_blend", path = "/v1/blends", tag = "blends",
-    params(("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`")),
+    params(("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`"),
+        ("Idempotency-Key" = Option<String>, Header, description = "Refuses this key with another request")),
     request_body = BlendOrder,
     responses(
         (status = 200, description = "The blend, made before", body = BlendDocument),
@@ -74,6 +76,7 @@ pub async fn create(
     State(app): State<App>,
     _: NoQuery,
     prefer: Prefer,
+    idempotency: Idempotency,
     Json(order): Json<BlendOrder>,
 ) -> Result<Response, Problem> {
     let most = app.config.limits.paints;
@@ -96,6 +99,9 @@ pub async fn create(
             .accepting("ids that GET /v1/paints lists"));
         }
     }
+    let whole = (&order.paints, profile, target.max_error, target.max_seconds);
+    let claimed = ids::made_of("b_", &whole);
+    idempotency.claim(&app, &claimed).await?;
     let picked = if target.is_some() {
         let picked = pick(&app, &order.paints, target).await?;
         profile = *picked.profile();
@@ -154,7 +160,13 @@ pub(super) async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended,
     let file = loop {
         let (on, this, paints) = (app.clone(), Arc::clone(under_way), canonical.clone());
         let compute = move || async move { correspond(&on, &this, paints, profile).await };
-        match app.results.get_or_compute(key, compute).await {
+        // Whoever finds it, this job can be called off on its own.
+        let found = tokio::select! {
+            found = app.results.get_or_compute(key, compute) => found,
+            () = under_way.called_off() => return Ok(Err(CalledOff)),
+            () = app.stopped() => return Ok(Err(CalledOff)),
+        };
+        match found {
             Ok(found) => break found.bytes,
             Err(problem) if problem.kind() != Kind::JobCancelled => return Err(problem),
             Err(_) if under_way.is_cancelled() || app.is_stopping() => return Ok(Err(CalledOff)),
@@ -265,6 +277,7 @@ pub(super) fn links(id: &str, paints: &[String], options: &BlendOptions) -> Valu
             "paints": paints.iter().map(|paint| format!("/v1/paints/{paint}")).collect::<Vec<_>>(),
             "preview": format!("{base}/preview.png?weights={weights}"),
             "bundle": format!("{base}/realisation.zip?weights={weights}"),
+            "slider_bundle": format!("{base}/bundle.zip"),
             "glb": format!("{base}/realisation.glb?weights={weights}"),
         }
     })

@@ -5,6 +5,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
 
+use super::visibility::Visibility;
 use crate::store::{CachedResult, Hash};
 
 /// A paint: everything known about it.
@@ -35,11 +36,19 @@ pub struct PaintDocument {
     /// How far its flakes are from the pixels they were made of, Lab, with the terms of it and how each is known.
     #[schema(value_type = Object)]
     pub error: Value,
+    /// How far the paint is from the multi-angle readings that came with its measurement; null where none did.
+    #[schema(value_type = Option<Object>)]
+    pub multi_angle: Value,
+    /// What had to be clamped, of a realised paint.
+    #[schema(value_type = Vec<Object>)]
+    pub clamps: Value,
     /// Energy certificate: directional albedo at six incidences.
     #[schema(value_type = Object)]
     pub energy: Value,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Whether lists show it.
+    pub visibility: Visibility,
     /// Addresses of what can be made of it.
     #[schema(value_type = Object)]
     pub links: Value,
@@ -84,6 +93,8 @@ pub struct PaintSummary {
     pub name: String,
     /// Kind of source: `package`, `rgl`, `mpi-2005`, `merl`, `sample`, `blend`.
     pub source: String,
+    /// Whether lists show it.
+    pub visibility: Visibility,
     /// BLAKE3 of the physical content.
     pub hash: String,
     /// Where it is.

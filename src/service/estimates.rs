@@ -241,6 +241,7 @@ impl EstimateOrder {
                     scene: self.scene.unwrap_or_default(),
                     size: self.size.unwrap_or([512; 2]),
                     samples_per_pixel: profile.samples_per_pixel,
+                    lights: None,
                 };
                 then(&Asked::Preview {
                     thing,

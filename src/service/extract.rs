@@ -7,6 +7,7 @@ use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
 use serde::de::DeserializeOwned;
 
+use super::app::App;
 use super::problem::{Kind, Problem};
 use super::query;
 
@@ -33,10 +34,10 @@ pub struct NoQuery;
 #[derive(Clone, Copy, Debug)]
 pub struct Address<T>(pub T);
 
-impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Json<T> {
+impl<T: DeserializeOwned> FromRequest<App> for Json<T> {
     type Rejection = Problem;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+    async fn from_request(request: Request, state: &App) -> Result<Self, Problem> {
         let media_type = request
             .headers()
             .get(header::CONTENT_TYPE)
@@ -53,8 +54,13 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Json<T> {
                 Problem::new(Kind::UnsupportedMediaType, detail).accepting("application/json")
             );
         }
-        let body = Bytes::from_request(request, state)
+        let time = state.config.body_time;
+        let body = tokio::time::timeout(time, Bytes::from_request(request, state))
             .await
+            .map_err(|_| {
+                let detail = format!("The body did not end in {} seconds.", time.as_secs_f32());
+                Problem::new(Kind::RequestTimeout, detail)
+            })?
             .map_err(|error| broken_body(&error))?;
         read_json(&body).map(Self)
     }
@@ -80,7 +86,13 @@ fn read_json<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
             .filter(|_| parent.is_empty())
             .map_or(parent, |name| format!("/{name}"));
         match cause.classify() {
-            serde_json::error::Category::Data => Problem::value(pointer, sentence(&cause)),
+            serde_json::error::Category::Data => {
+                let problem = Problem::value(pointer, sentence(&cause));
+                match expected(&cause.to_string()) {
+                    Some(accepted) => problem.accepting(accepted),
+                    None => problem,
+                }
+            }
             _ => Problem::new(
                 Kind::MalformedRequest,
                 format!("The body is not JSON: {cause}."),
@@ -94,6 +106,26 @@ fn read_json<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
         )
     })?;
     Ok(value)
+}
+
+/// What would be accepted, where a reader's message says it: "…, expected one of `a`, `b` at line 1 column 2".
+fn expected(message: &str) -> Option<String> {
+    if let Some(field) = message.strip_prefix("missing field `") {
+        return field
+            .split_once('`')
+            .map(|(name, _)| format!("an object with the field {name}"));
+    }
+    let (_, rest) = message.rsplit_once(", expected ")?;
+    let rest = rest.split_once(" at line ").map_or(rest, |(what, _)| what);
+    let what = rest.strip_prefix("one of ").unwrap_or(rest);
+    Some(match what {
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0".to_owned(),
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".to_owned(),
+        "f32" | "f64" => "a number".to_owned(),
+        "a sequence" => "a list".to_owned(),
+        what if what == "a map" || what.starts_with("struct ") => "an object".to_owned(),
+        what => what.replace('`', ""),
+    })
 }
 
 /// The field that an object lacks or has twice: the reader names it, but does not point at it.
@@ -162,10 +194,14 @@ impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for Address
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         match Path::from_request_parts(parts, state).await {
             Ok(Path(address)) => Ok(Self(address)),
-            Err(_) => Err(Problem::new(
-                Kind::UnknownAddress,
-                "There is nothing at this address.",
-            )),
+            Err(refused) => {
+                let accepted = expected(&refused.body_text())
+                    .unwrap_or_else(|| "the addresses listed in /openapi.json".to_owned());
+                Err(
+                    Problem::new(Kind::UnknownAddress, "There is nothing at this address.")
+                        .accepting(accepted),
+                )
+            }
         }
     }
 }
@@ -180,6 +216,41 @@ mod tests {
     struct Order {
         #[allow(dead_code)] // read by the reader only
         paints: Vec<String>,
+        #[allow(dead_code)] // read by the reader only
+        clusters: Option<u32>,
+        #[allow(dead_code)] // read by the reader only
+        scene: Option<Scene>,
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Scene {
+        Sphere,
+        Panel,
+    }
+
+    #[test]
+    fn a_json_problem_says_what_would_be_accepted() {
+        let cases = [
+            (r#"{"paints": 3}"#, "a list"),
+            (
+                r#"{"paints": [], "clusters": 5.5}"#,
+                "a whole number from 0",
+            ),
+            (r#"{"paints": [], "scene": "cube"}"#, "sphere or panel"),
+            (
+                r#"{"paints": [], "surprise": 1}"#,
+                "paints, clusters, scene",
+            ),
+            (r"{}", "an object with the field paints"),
+            (r#""paints""#, "an object"),
+        ];
+        for (body, accepted) in cases {
+            let problem = read_json::<Order>(body.as_bytes())
+                .expect_err(body)
+                .document(None);
+            assert_eq!(problem.accepted.as_deref(), Some(accepted), "{body}");
+        }
     }
 
     #[test]

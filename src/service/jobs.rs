@@ -1,6 +1,5 @@
 //! Jobs over HTTP: how they stand, what they tell, and calling them off.
 
-use std::convert::Infallible;
 use std::time::Duration;
 
 use axum::extract::State;
@@ -65,11 +64,8 @@ pub async fn events(
         } else {
             "progress"
         };
-        let event = Event::default()
-            .event(name)
-            .json_data(&job)
-            .unwrap_or_default();
-        Ok::<_, Infallible>(event)
+        // What does not serialise, a bug, ends the stream.
+        Event::default().event(name).json_data(&job)
     });
     let mut response = Sse::new(events)
         .keep_alive(KeepAlive::default())

@@ -21,6 +21,8 @@ pub struct Metrics {
     pub blends_computed: Counter,
     /// Realisations that were computed and written, not taken from the cache.
     pub realisations_computed: Counter,
+    /// Bundles of whole blends that were written, not taken from the cache.
+    pub blend_bundles_computed: Counter,
     /// Pictures that were rendered, not taken from the cache.
     pub previews_rendered: Counter,
 }
@@ -58,6 +60,10 @@ impl Metrics {
             "carpaint_realisations_computed_total",
             "Realisations that were computed",
         );
+        let blend_bundles_computed = counter(
+            "carpaint_blend_bundles_computed_total",
+            "Bundles of whole blends that were written",
+        );
         let previews_rendered = counter(
             "carpaint_previews_rendered_total",
             "Pictures that were rendered",
@@ -74,6 +80,7 @@ impl Metrics {
             paints_fitted,
             blends_computed,
             realisations_computed,
+            blend_bundles_computed,
             previews_rendered,
         }
     }

@@ -11,6 +11,7 @@
 mod accuracy;
 mod answer;
 mod app;
+mod blend_bundles;
 mod blends;
 mod docs;
 mod documents;
@@ -18,6 +19,7 @@ mod envelope;
 mod estimates;
 mod extract;
 mod home;
+mod idempotency;
 mod ids;
 mod jobs;
 mod metrics;
@@ -32,7 +34,9 @@ mod runner;
 mod samples;
 mod serve;
 mod targets;
+mod visibility;
 mod waiting;
+mod watchers;
 mod weights;
 mod workbench;
 mod works;
@@ -43,8 +47,8 @@ pub use docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
-    Asked, Estimate, Fault, Format, IngestOrder, Layout, Picked, Picture, PictureFormat, Progress,
-    Scene, Target, ThetaH, Thing, View, WorkError, Works,
+    Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
+    Progress, Scene, Target, ThetaH, Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 
@@ -72,6 +76,8 @@ pub struct ServiceConfig {
     pub most_connections: usize,
     /// Longest time for the header of a request.
     pub header_time: Duration,
+    /// Longest time for a JSON body.
+    pub body_time: Duration,
     /// Longest time for requests under way when the service goes down.
     pub grace: Duration,
 }
@@ -89,6 +95,7 @@ impl ServiceConfig {
             most_jobs: 256,
             most_connections: 1024,
             header_time: Duration::from_secs(10),
+            body_time: Duration::from_secs(10),
             grace: Duration::from_secs(5),
         }
     }

@@ -1,9 +1,9 @@
 //! Paints: uploads become paints, which can be listed, read, taken back and deleted.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use axum::body::Body;
+use axum::body::{Body, BodyDataStream};
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -16,25 +16,28 @@ use super::answer::{Answer, Keep};
 use super::app::App;
 use super::documents::{PaintDocument, PaintList, PaintSummary};
 use super::extract::{Address, NoQuery, Query};
+use super::idempotency::Idempotency;
 use super::ids;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::profile::ProfileText;
 use super::runner::{self, Ended, JobDocument, UnderWay};
 use super::targets;
+use super::visibility::Visibility;
 use super::waiting::Prefer;
 use super::workbench::CalledOff;
 use super::works::{Asked, Format, IngestOrder, Layout, Picked, Target, ThetaH};
 use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
+use crate::workshop::NAME_CHARACTERS;
 
 /// Longest silence in the middle of an upload.
 const SILENCE: Duration = Duration::from_secs(30);
 
+/// Least bytes a second of an upload, but for so much time as one silence.
+const LEAST_RATE: u64 = 16 << 10;
+
 /// Longest time that a refused upload is still taken in, and most bytes of it.
 const PATIENCE: Duration = Duration::from_secs(5);
 const MOST_DRAINED: usize = 64 << 20;
-
-/// Longest name of a paint, characters.
-const LONGEST_NAME: usize = 200;
 
 /// Longest page of a list.
 const LONGEST_PAGE: u32 = 200;
@@ -76,6 +79,8 @@ pub struct IngestQuery {
 pub struct ListQuery {
     /// Words that name or source contain, whatever the case.
     q: Option<String>,
+    /// `private` lists paints that are not published, in place of those that are.
+    visibility: Option<Visibility>,
     /// `next` of the page before.
     cursor: Option<String>,
     /// Most paints on the page, 50 unless given.
@@ -103,7 +108,7 @@ impl Hash64 {
 impl IngestQuery {
     fn order(self) -> Result<IngestOrder, Problem> {
         if let Some(name) = &self.name
-            && (!(1..=LONGEST_NAME).contains(&name.chars().count())
+            && (!NAME_CHARACTERS.contains(&name.chars().count())
                 || name.chars().any(char::is_control))
         {
             return Err(Problem::parameter(
@@ -148,7 +153,8 @@ impl IngestQuery {
 /// answered with the job that goes on.
 #[utoipa::path(
     post, operation_id = "upload_paint", path = "/v1/paints", tag = "paints", params(IngestQuery,
-        ("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`")),
+        ("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`"),
+        ("Idempotency-Key" = Option<String>, Header, description = "Refuses this key with another request")),
     request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "The measurement"),
     responses(
         (status = 200, description = "The paint, made of the same upload before", body = PaintDocument),
@@ -163,6 +169,7 @@ pub async fn upload(
     State(app): State<App>,
     query: Result<Query<IngestQuery>, Problem>,
     prefer: Prefer,
+    idempotency: Result<Idempotency, Problem>,
     request: Request,
 ) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
@@ -177,45 +184,89 @@ pub async fn upload(
         },
     );
     let order = query.and_then(|Query(query)| Ok((query.order()?, target?)));
-    let order = match order.and_then(|order| check_headers(&app, &parts.headers).map(|()| order)) {
-        Ok(order) => order,
+    let order = order.and_then(|order| check_headers(&app, &parts.headers).map(|()| order));
+    let (order, idempotency) = match order.and_then(|order| Ok((order, idempotency?))) {
+        Ok(asked) => asked,
         Err(problem) => {
-            let _ = tokio::time::timeout(PATIENCE, drain(body)).await;
+            drain(body.into_data_stream()).await;
             return Err(problem);
         }
     };
     let received = receive(&app, body).await?;
+    let accepted = runner::to_its_end(accept(app.clone(), received, order, idempotency)).await?;
+    let Accepted { id, job, picked } = accepted;
+    let address = format!("/v1/paints/{id}");
+    let Some(job) = job else {
+        let known = app.paint(&id).await?.document.clone();
+        let answer = Answer::result("application/json", known, Keep::Revalidated);
+        let answer = answer.location(&address).picked(picked.as_ref());
+        return Ok(answer.into_response());
+    };
+    let made = || async { Ok(app.paint(&id).await?.document.clone()) };
+    let answer = prefer.answer(&app, &job, &address, made).await?;
+    Ok(targets::told(answer, picked.as_ref()))
+}
+
+/// An upload that was kept.
+struct Accepted {
+    /// Id of the paint it becomes.
+    id: String,
+    /// The job that makes it, unless it was made before.
+    job: Option<String>,
+    /// What was picked for a target.
+    picked: Option<Picked>,
+}
+
+/// Keeps what was received and has a job make a paint of it, unless there is one.
+async fn accept(
+    app: App,
+    received: Box<dyn BlobWriter>,
+    (mut order, target): (IngestOrder, Target),
+    idempotency: Idempotency,
+) -> Result<Accepted, Problem> {
     // Until a job names the upload it must not be swept as nobody's.
-    let naming = app.removal.read().await;
+    let mut naming = app.removal.read().await;
     let stored = received.finish().await?;
-    let (mut order, target) = order;
+    let whole = (
+        stored.hash.to_string(),
+        &order,
+        target.max_error,
+        target.max_seconds,
+    );
+    let claimed = idempotency.claim(&app, &ids::made_of("p_", &whole)).await;
     let mut picked = None;
-    if target.is_some() {
-        match pick_for_upload(&app, stored.hash, &order, target).await {
-            Ok(found) => {
-                order.profile = *found.profile();
-                picked = Some(found);
-            }
-            Err(problem) => {
-                drop(naming);
-                app.forget_upload(stored.hash).await?;
-                return Err(problem);
+    let ready = match claimed {
+        Ok(()) if target.is_some() => {
+            // Not held while a place to compute is waited for.
+            drop(naming);
+            let found = pick_for_upload(&app, stored.hash, &order, target).await;
+            naming = app.removal.read().await;
+            match found {
+                Ok(_) if app.blobs.local(stored.hash).await?.is_none() => {
+                    Err(Problem::overloaded())
+                }
+                Ok(found) => {
+                    order.profile = *found.profile();
+                    picked = Some(found);
+                    Ok(())
+                }
+                Err(problem) => Err(problem),
             }
         }
+        claimed => claimed,
+    };
+    if let Err(problem) = ready {
+        drop(naming);
+        app.forget_upload(stored.hash).await?;
+        return Err(problem);
     }
     let id = ids::made_of("p_", &(stored.hash.to_string(), &order));
-    let address = format!("/v1/paints/{id}");
     if app.catalogue.paint(&id).await?.is_some() {
-        drop(naming);
-        let known = app.paint(&id).await?;
-        return Ok(Answer::result(
-            "application/json",
-            known.document.clone(),
-            Keep::Revalidated,
-        )
-        .location(&address)
-        .picked(picked.as_ref())
-        .into_response());
+        return Ok(Accepted {
+            id,
+            job: None,
+            picked,
+        });
     }
     let request = IngestRequest {
         upload: Hash64(stored.hash.to_string()),
@@ -223,16 +274,17 @@ pub async fn upload(
     };
     let job = runner::submit(&app, JobKind::Ingest, &id, &request).await;
     drop(naming);
-    let job = match job {
-        Ok(job) => job,
+    match job {
+        Ok(job) => Ok(Accepted {
+            id,
+            job: Some(job),
+            picked,
+        }),
         Err(problem) => {
             app.forget_upload(stored.hash).await?;
-            return Err(problem);
+            Err(problem)
         }
-    };
-    let made = || async { Ok(app.paint(&id).await?.document.clone()) };
-    let answer = prefer.answer(&app, &job, &address, made).await?;
-    Ok(targets::told(answer, picked.as_ref()))
+    }
 }
 
 async fn pick_for_upload(
@@ -291,23 +343,25 @@ fn too_large(app: &App) -> Problem {
         .accepting(format!("up to {} bytes", app.config.limits.bytes))
 }
 
-/// Takes in what is refused: who still sends does not listen.
-async fn drain(body: Body) {
-    let mut pieces = body.into_data_stream();
-    let mut length = 0;
-    while let Some(Ok(piece)) = pieces.next().await {
-        length += piece.len();
-        if length > MOST_DRAINED {
-            return;
+/// Takes in what is refused, within reason: who still sends does not listen.
+async fn drain(mut pieces: BodyDataStream) {
+    let drained = async {
+        let mut length = 0;
+        while let Some(Ok(piece)) = pieces.next().await {
+            length += piece.len();
+            if length > MOST_DRAINED {
+                return;
+            }
         }
-    }
+    };
+    let _ = tokio::time::timeout(PATIENCE, drained).await;
 }
 
 /// Streams a body into a blob that is still to be finished.
 async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Problem> {
     let mut writer = app.blobs.begin().await?;
     let mut pieces = body.into_data_stream();
-    let mut length = 0;
+    let (mut length, begun) = (0, Instant::now());
     loop {
         let piece = match tokio::time::timeout(SILENCE, pieces.next()).await {
             Ok(None) => break,
@@ -328,7 +382,21 @@ async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Problem> 
         };
         length += piece.len() as u64;
         if length > app.config.limits.bytes {
+            drop(writer);
+            drain(pieces).await;
             return Err(too_large(app));
+        }
+        if begun.elapsed() > SILENCE + Duration::from_secs(length / LEAST_RATE) {
+            let detail = format!(
+                "{length} bytes came in {} seconds.",
+                begun.elapsed().as_secs()
+            );
+            return Err(
+                Problem::new(Kind::RequestTimeout, detail).accepting(format!(
+                    "at least {LEAST_RATE} bytes a second after the first {} seconds",
+                    SILENCE.as_secs()
+                )),
+            );
         }
         writer.append(piece).await?;
     }
@@ -398,7 +466,12 @@ pub async fn list(
     }
     let page = app
         .catalogue
-        .paints(query.q.as_deref(), cursor, limit)
+        .paints(
+            query.q.as_deref(),
+            query.visibility.unwrap_or_default().into(),
+            cursor,
+            limit,
+        )
         .await?;
     let list = PaintList {
         paints: page.paints.into_iter().map(summary).collect(),
@@ -423,6 +496,7 @@ fn summary(record: PaintRecord) -> PaintSummary {
         id: record.id,
         name: record.name,
         source: record.source,
+        visibility: record.visibility.into(),
         hash: record.content.to_string(),
     }
 }
@@ -468,7 +542,10 @@ pub async fn file(
     let paint = app.paint(&id).await?;
     let missing = || Problem::internal(format!("the file of {id} is not there"));
     let blob = app.blobs.stream(paint.file).await?.ok_or_else(missing)?;
-    Ok(Answer::blob(Format::Paint.media_type(), paint.file, blob).saved_as(&format!("{id}.paint")))
+    Ok(
+        Answer::blob(Format::Paint.media_type(), paint.file, blob, Keep::ForEver)
+            .saved_as(&format!("{id}.paint")),
+    )
 }
 
 /// The measurement a paint was made of: the very bytes that were uploaded.
@@ -495,8 +572,10 @@ pub async fn measurement(
     let upload = paint.measurement.ok_or_else(none)?;
     let missing = || Problem::internal(format!("the measurement of {id} is not there"));
     let blob = app.blobs.stream(upload).await?.ok_or_else(missing)?;
-    Ok(Answer::blob("application/octet-stream", upload, blob)
-        .saved_as(&format!("{id}.measurement")))
+    Ok(
+        Answer::blob("application/octet-stream", upload, blob, Keep::Own)
+            .saved_as(&format!("{id}.measurement")),
+    )
 }
 
 /// Delete a paint with its measurement. Blends that were made of it stay.
@@ -522,6 +601,7 @@ pub(super) fn links(record: &PaintRecord) -> Value {
     let base = format!("/v1/paints/{}", record.id);
     let measurement = record.measurement.map(|_| format!("{base}/measurement"));
     json!({
+        "visibility": Visibility::from(record.visibility),
         "links": {
             "self": base,
             "paint": format!("{base}/paint"),

@@ -2,31 +2,36 @@
 
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use axum::extract::State;
-use axum::http::HeaderName;
+use axum::extract::{RawQuery, State};
+use axum::http::{HeaderName, header};
 use bytes::Bytes;
-use serde::{Deserialize, Deserializer};
-use utoipa::IntoParams;
+use serde::{Deserialize, Deserializer, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
 use super::answer::{Answer, Keep};
 use super::app::{App, Shelved};
-use super::extract::{Address, Query, QueryOfTwo};
+use super::extract::{Address, Json, NoQuery, Query, QueryOfTwo};
+use super::idempotency::Idempotency;
 use super::ids;
-use super::problem::{Problem, ProblemDocument};
-use super::profile::ProfileText;
+use super::problem::{Kind, Problem, ProblemDocument};
+use super::profile::{ProfileDocument, ProfileText};
 use super::targets;
 use super::weights::WeightQuery;
-use super::works::{Asked, Picture, PictureFormat, Scene, View};
+use super::workbench::call_off;
+use super::works::{Asked, Light, Picked, Picture, PictureFormat, Scene, View};
 use crate::blend::RealisationWeights;
-use crate::store::CachedResult;
+use crate::store::{CachedResult, Hash};
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u32 = 4096;
 
 /// Most samples of one picture: pixels times samples per pixel.
-const MOST_SAMPLES: u64 = 1 << 30;
+const MOST_SAMPLES: u64 = 1 << 28;
+
+/// Most lights of a scene.
+const MOST_LIGHTS: usize = 16;
 
 /// What a picture shows.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -40,6 +45,9 @@ pub struct ViewQuery {
     /// Samples per pixel, in place of the profile's.
     #[param(minimum = 1, maximum = 4096)]
     spp: Option<u32>,
+    /// Direction towards the light, in place of the scene's usual one: x to the right, y up, z towards the viewer.
+    #[param(style = Form, explode = false, min_items = 3, max_items = 3)]
+    light: Option<Vec<f32>>,
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `draft,samples_per_pixel=100`.
     #[param(value_type = Option<String>, example = "standard")]
     profile: Option<ProfileText>,
@@ -81,43 +89,146 @@ impl<'de> Deserialize<'de> for Size {
 impl ViewQuery {
     fn view(&self, app: &App) -> Result<View, Problem> {
         let Size(size) = self.size.unwrap_or(Size([512, 512]));
-        let most = app.config.limits.samples;
-        let spp = match self.spp {
-            Some(spp) if (1..=most).contains(&spp) => spp,
-            Some(spp) => {
-                return Err(Problem::parameter("spp", format!("spp is {spp}."))
-                    .accepting(format!("1 to {most}")));
-            }
-            None => {
-                self.profile
-                    .clone()
-                    .unwrap_or_default()
-                    .of_query()?
-                    .samples_per_pixel
-            }
-        };
-        if u64::from(size[0]) * u64::from(size[1]) * u64::from(spp) > MOST_SAMPLES {
-            let detail = format!(
-                "{} x {} pixels with {spp} samples each are too much.",
-                size[0], size[1]
-            );
-            return Err(Problem::parameter("spp", detail)
-                .accepting(format!("up to {MOST_SAMPLES} samples in all")));
-        }
-        Ok(View {
-            scene: self.scene.unwrap_or_default(),
+        let profile = self.profile.clone().unwrap_or_default().of_query()?;
+        let light = self.light.as_deref().map(|list| {
+            <[f32; 3]>::try_from(list)
+                .map(|towards| Light {
+                    towards,
+                    irradiance: None,
+                })
+                .map_err(|_| {
+                    let detail = format!("light has {} numbers.", list.len());
+                    Problem::parameter("light", detail)
+                        .accepting("3 numbers, the direction towards the light")
+                })
+        });
+        view(
+            app,
+            self.scene.unwrap_or_default(),
             size,
-            samples_per_pixel: spp,
-        })
+            self.spp.unwrap_or(profile.samples_per_pixel),
+            light.transpose()?.map(|light| vec![light]),
+        )
+    }
+}
+
+impl ViewQuery {
+    /// The view, with the samples that meet a target where there is one.
+    async fn picked_view(
+        &self,
+        app: &App,
+        thing: &Arc<Shelved>,
+        weights: Option<&RealisationWeights>,
+        format: PreviewFormat,
+    ) -> Result<(View, Option<Picked>), Problem> {
+        let mut view = self.view(app)?;
+        let knobs = self.profile.is_some() || self.spp.is_some();
+        let target = targets::of_query(self.max_error, self.max_seconds, knobs)?;
+        if !target.is_some() {
+            return Ok((view, None));
+        }
+        let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(thing), weights.cloned());
+        let wanted = view.clone();
+        let found = app.bench.run(move || {
+            let asked = Asked::Preview {
+                thing: &thing.thing,
+                weights: weights.as_ref(),
+                view: &wanted,
+                format: format.drawn(),
+            };
+            works.pick(&asked, &target)
+        });
+        let found = found.await?.map_err(super::works::WorkError::of_query)?;
+        view.samples_per_pixel = found.profile().samples_per_pixel;
+        Ok((view, Some(found)))
+    }
+}
+
+/// A view, with everything in range. A parameter that is not is named as in a query.
+fn view(
+    app: &App,
+    scene: Scene,
+    size: [u32; 2],
+    spp: u32,
+    lights: Option<Vec<Light>>,
+) -> Result<View, Problem> {
+    let most = app.config.limits.samples;
+    if !(1..=most).contains(&spp) {
+        return Err(
+            Problem::parameter("spp", format!("spp is {spp}.")).accepting(format!("1 to {most}"))
+        );
+    }
+    let [width, height] = size;
+    if !size.iter().all(|side| (1..=LONGEST_SIDE).contains(side)) {
+        return Err(
+            Problem::parameter("size", format!("The size is {width} x {height}."))
+                .accepting(format!("1 to {LONGEST_SIDE} each")),
+        );
+    }
+    if u64::from(width) * u64::from(height) * u64::from(spp) > MOST_SAMPLES {
+        let detail = format!("{width} x {height} pixels with {spp} samples each are too much.");
+        return Err(Problem::parameter("spp", detail)
+            .accepting(format!("up to {MOST_SAMPLES} samples in all")));
+    }
+    for light in lights.iter().flatten() {
+        let length: f32 = light.towards.iter().map(|v| v * v).sum();
+        let bright = light.irradiance.unwrap_or_default();
+        let dim = bright.iter().all(|v| (0.0..=65504.0).contains(v));
+        if !(length > 0.0 && length.is_finite() && dim) {
+            return Err(
+                Problem::parameter("light", "A light is no light.").accepting(
+                    "a direction of some length, and an irradiance of 0 to 65504 per channel",
+                ),
+            );
+        }
+    }
+    if lights
+        .as_ref()
+        .is_some_and(|lights| lights.len() > MOST_LIGHTS)
+    {
+        return Err(Problem::parameter("light", "There are too many lights.")
+            .accepting(format!("up to {MOST_LIGHTS}")));
+    }
+    Ok(View {
+        scene,
+        size,
+        samples_per_pixel: spp,
+        lights,
+    })
+}
+
+/// What is sent of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PreviewFormat {
+    /// Tone mapped for a screen, 8 bits.
+    Png,
+    /// Linear light.
+    Exr,
+    /// The report on the picture: what was drawn and what left out and why, what had to be clamped, how accurate it is.
+    Json,
+}
+
+impl PreviewFormat {
+    /// The picture that is drawn for it.
+    const fn drawn(self) -> PictureFormat {
+        match self {
+            Self::Png | Self::Json => PictureFormat::Png,
+            Self::Exr => PictureFormat::Exr,
+        }
     }
 }
 
 /// A picture of a blend at some weights.
+///
+/// `json` is the report on the picture: effects that were planned or left out, what was clamped, how accurate it is.
 #[utoipa::path(
     get, operation_id = "preview_blend", path = "/v1/blends/{id}/preview.{format}", tag = "previews",
-    params(("id" = String, Path, description = "Blend"), ("format" = PictureFormat, Path, description = "Picture"), WeightQuery, ViewQuery),
+    params(("id" = String, Path, description = "Blend"), ("format" = PreviewFormat, Path, description = "Picture, or its report"), WeightQuery, ViewQuery),
     responses(
-        (status = 200, description = "The picture", headers(("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
+        (status = 200, description = "The picture", headers(
+            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab"),
+            ("Link" = String, description = "The picture's report")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
         (status = 400, description = "Weights that do not fit the blend, or a view that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
@@ -125,31 +236,188 @@ impl ViewQuery {
 )]
 pub async fn of_blend(
     State(app): State<App>,
-    Address((id, format)): Address<(String, PictureFormat)>,
+    Address((id, format)): Address<(String, PreviewFormat)>,
     QueryOfTwo(weights, query): QueryOfTwo<WeightQuery, ViewQuery>,
+    RawQuery(raw): RawQuery,
 ) -> Result<Answer, Problem> {
     let blend = app.blend(&id).await?;
     let weights = weights.for_blend(&blend.names)?;
-    draw(&app, blend, Some(weights), format, &query).await
+    let weights = Some(weights);
+    let (view, picked) = query
+        .picked_view(&app, &blend, weights.as_ref(), format)
+        .await?;
+    let drawn = draw(&app, blend, weights, format.drawn(), view).await?;
+    let report = report_link(&format!("/v1/blends/{id}"), raw.as_deref());
+    Ok(drawn
+        .answer(format, picked.as_ref())
+        .header(header::LINK, &report))
 }
 
 /// A picture of a paint.
+///
+/// `json` is the report on the picture: effects that were planned or left out, how accurate it is.
 #[utoipa::path(
     get, operation_id = "preview_paint", path = "/v1/paints/{id}/preview.{format}", tag = "previews",
-    params(("id" = String, Path, description = "Paint"), ("format" = PictureFormat, Path, description = "Picture"), ViewQuery),
+    params(("id" = String, Path, description = "Paint"), ("format" = PreviewFormat, Path, description = "Picture, or its report"), ViewQuery),
     responses(
-        (status = 200, description = "The picture", headers(("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))),
+        (status = 200, description = "The picture", headers(
+            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab"),
+            ("Link" = String, description = "The picture's report")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
         (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
 )]
 pub async fn of_paint(
     State(app): State<App>,
-    Address((id, format)): Address<(String, PictureFormat)>,
+    Address((id, format)): Address<(String, PreviewFormat)>,
     Query(query): Query<ViewQuery>,
+    RawQuery(raw): RawQuery,
 ) -> Result<Answer, Problem> {
     let paint = app.paint(&id).await?;
-    draw(&app, paint, None, format, &query).await
+    let weights = None;
+    let (view, picked) = query
+        .picked_view(&app, &paint, weights.as_ref(), format)
+        .await?;
+    let drawn = draw(&app, paint, weights, format.drawn(), view).await?;
+    let report = report_link(&format!("/v1/paints/{id}"), raw.as_deref());
+    Ok(drawn
+        .answer(format, picked.as_ref())
+        .header(header::LINK, &report))
+}
+
+/// A whole scene.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PreviewOrder {
+    /// Id of a paint. Either this or `blend`.
+    paint: Option<String>,
+    /// Id of a blend, with weights.
+    blend: Option<String>,
+    /// One weight per paint of the blend.
+    weights: Option<Vec<f64>>,
+    /// Weights of coat, diffuse, lobes and color table alone.
+    base: Option<Vec<f64>>,
+    /// Weights of the flakes' lightness, grain and lifetime alone.
+    flake_lightness: Option<Vec<f64>>,
+    /// Weights of the flakes' color alone.
+    flake_color: Option<Vec<f64>>,
+    /// Factor on the flakes' color: 0 makes them white, 1 leaves them.
+    flake_saturation: Option<f64>,
+    /// What the paint is on, `sphere` unless given.
+    scene: Option<Scene>,
+    /// Width and height in pixels, 512 and 512 unless given.
+    size: Option<[u32; 2]>,
+    /// Samples per pixel, in place of the profile's.
+    #[schema(minimum = 1, maximum = 4096)]
+    samples_per_pixel: Option<u32>,
+    /// Lights in place of the scene's usual one; none leaves the surroundings alone.
+    #[schema(max_items = 16)]
+    lights: Option<Vec<Light>>,
+    /// Accuracy: the name of a preset, or an object of knobs.
+    #[schema(value_type = Option<ProfileDocument>)]
+    profile: Option<ProfileText>,
+    /// What is sent, `png` unless given.
+    format: Option<PreviewFormat>,
+}
+
+/// A picture of a whole scene.
+#[utoipa::path(
+    post, operation_id = "create_preview", path = "/v1/previews", tag = "previews", request_body = PreviewOrder,
+    params(("Idempotency-Key" = Option<String>, Header, description = "Refuses this key with another request")),
+    responses(
+        (status = 200, description = "The picture", headers(
+            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab")),
+            content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
+        (status = 422, description = "A paint that is not there, weights that do not fit, or a scene that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn create(
+    State(app): State<App>,
+    _: NoQuery,
+    idempotency: Idempotency,
+    Json(order): Json<PreviewOrder>,
+) -> Result<Answer, Problem> {
+    let (thing, weights) = order.thing(&app).await?;
+    let profile = order.profile.clone().unwrap_or_default().of_body()?;
+    let spp = order.samples_per_pixel;
+    let view = view(
+        &app,
+        order.scene.unwrap_or_default(),
+        order.size.unwrap_or([512, 512]),
+        spp.unwrap_or(profile.samples_per_pixel),
+        order.lights,
+    )
+    .map_err(|problem| problem.in_body("spp", "samples_per_pixel"))?;
+    let format = order.format.unwrap_or(PreviewFormat::Png);
+    let key = key(&thing, weights.as_ref(), &view, format.drawn());
+    idempotency.claim(&app, &key.to_string()).await?;
+    let drawn = draw(&app, thing, weights, format.drawn(), view).await;
+    Ok(drawn
+        .map_err(|problem| problem.in_body("", ""))?
+        .answer(format, None))
+}
+
+impl PreviewOrder {
+    async fn thing(
+        &self,
+        app: &App,
+    ) -> Result<(Arc<Shelved>, Option<RealisationWeights>), Problem> {
+        let missing = |field: &str, problem: Problem| match problem.kind() {
+            Kind::UnknownPaint | Kind::UnknownBlend => problem.as_value(field),
+            _ => problem,
+        };
+        match (&self.paint, &self.blend) {
+            (Some(id), None) => {
+                let weights = [
+                    ("weights", &self.weights),
+                    ("base", &self.base),
+                    ("flake_lightness", &self.flake_lightness),
+                    ("flake_color", &self.flake_color),
+                ];
+                let given = weights.iter().find(|(_, list)| list.is_some());
+                let saturation = self.flake_saturation.map(|_| "flake_saturation");
+                if let Some(field) = given.map(|(field, _)| *field).or(saturation) {
+                    let detail = format!("One paint takes no {field}.");
+                    return Err(Problem::value(format!("/{field}"), detail).accepting("nothing"));
+                }
+                let paint = app.paint(id).await.map_err(|p| missing("paint", p))?;
+                Ok((paint, None))
+            }
+            (None, Some(id)) => {
+                let blend = app.blend(id).await.map_err(|p| missing("blend", p))?;
+                let asked = WeightQuery::of_lists(
+                    self.weights.clone(),
+                    self.base.clone(),
+                    self.flake_lightness.clone(),
+                    self.flake_color.clone(),
+                    self.flake_saturation,
+                );
+                let weights = asked.for_blend(&blend.names);
+                Ok((
+                    Arc::clone(&blend),
+                    Some(weights.map_err(|problem| problem.in_body("", ""))?),
+                ))
+            }
+            _ => Err(
+                Problem::value("/paint", "Neither or both of paint and blend are given.")
+                    .accepting("the id of a paint, or of a blend"),
+            ),
+        }
+    }
+}
+
+/// Key of a picture: everything that makes it.
+fn key(
+    thing: &Shelved,
+    weights: Option<&RealisationWeights>,
+    view: &View,
+    format: PictureFormat,
+) -> Hash {
+    ids::key(
+        "preview",
+        &(&thing.id, thing.file.to_string(), weights, view, format),
+    )
 }
 
 async fn draw(
@@ -157,69 +425,105 @@ async fn draw(
     thing: Arc<Shelved>,
     weights: Option<RealisationWeights>,
     format: PictureFormat,
-    query: &ViewQuery,
-) -> Result<Answer, Problem> {
+    view: View,
+) -> Result<Drawn, Problem> {
     let begun = Instant::now();
-    let mut view = query.view(app)?;
-    let knobs = query.profile.is_some() || query.spp.is_some();
-    let target = targets::of_query(query.max_error, query.max_seconds, knobs)?;
-    let mut picked = None;
-    if target.is_some() {
-        let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(&thing), weights.clone());
-        let found = app.bench.run(move || {
-            let asked = Asked::Preview {
-                thing: &thing.thing,
-                weights: weights.as_ref(),
-                view: &view,
-                format,
+    let key = key(&thing, weights.as_ref(), &view, format);
+    let _waits = app.watchers.watch(key);
+    let kept = loop {
+        let (on, thing, weights) = (app.clone(), Arc::clone(&thing), weights.clone());
+        let view = view.clone();
+        let compute = move || async move {
+            let (works, counter) = (Arc::clone(&on.works), on.metrics.previews_rendered.clone());
+            let bench = on.bench.clone();
+            let progress = move |_: f32| {
+                if on.is_stopping() || !on.watchers.any(key) {
+                    call_off();
+                }
             };
-            works.pick(&asked, &target)
-        });
-        let found = found.await?.map_err(super::works::WorkError::of_query)?;
-        view.samples_per_pixel = found.profile().samples_per_pixel;
-        picked = Some(found);
-    }
-    let key = ids::key(
-        "preview",
-        &(&thing.id, thing.file.to_string(), &weights, view, format),
-    );
-    let on = app.clone();
-    let compute = move || async move {
-        let (works, counter) = (Arc::clone(&on.works), on.metrics.previews_rendered.clone());
-        let drawn = on
-            .bench
-            .run(move || works.preview(&thing.thing, weights.as_ref(), &view, format))
-            .await?;
-        let picture = drawn.map_err(super::works::WorkError::of_query)?;
-        counter.increment(1);
-        Ok(with_accuracy(&picture))
+            let drawn = bench.run_or_call_off(move || {
+                works.preview(&thing.thing, weights.as_ref(), &view, format, &progress)
+            });
+            let Ok(drawn) = drawn.await? else {
+                return Err(Problem::new(
+                    Kind::JobCancelled,
+                    "Nobody waited for this picture any more.",
+                ));
+            };
+            let picture = drawn.map_err(super::works::WorkError::of_query)?;
+            counter.increment(1);
+            Ok(kept_form(&picture))
+        };
+        match app.results.get_or_compute(key, compute).await {
+            // Whoever was before us gave up a moment ago.
+            Err(problem) if problem.kind() == Kind::JobCancelled && !app.is_stopping() => {}
+            Err(problem) if problem.kind() == Kind::JobCancelled => {
+                return Err(Problem::overloaded());
+            }
+            kept => break kept?,
+        }
     };
-    let kept = app.results.get_or_compute(key, compute).await?;
-    let (accuracy, picture) = split(&kept)?;
-    // What a target picks may change with the machine's load.
-    let keep = picked.as_ref().map_or(Keep::ForEver, |_| Keep::Revalidated);
-    Ok(Answer::result(format.media_type(), picture, keep)
-        .header(ACCURACY, &accuracy)
-        .picked(picked.as_ref())
-        .stage("preview", begun.elapsed()))
+    let (accuracy, report, picture) = split(&kept)?;
+    Ok(Drawn {
+        accuracy,
+        report,
+        picture,
+        time: begun.elapsed(),
+    })
+}
+
+/// The report on a picture stands beside it, under the same query.
+fn report_link(address: &str, query: Option<&str>) -> String {
+    let query = query.map_or(String::new(), |query| format!("?{query}"));
+    format!("<{address}/preview.json{query}>; rel=\"describedby\"; type=\"application/json\"")
 }
 
 /// How accurate a picture is: it belongs to the picture, so it is kept with it.
 const ACCURACY: HeaderName = HeaderName::from_static("carpaint-accuracy");
 
-/// What is kept of a picture: its accuracy, a line feed, the file.
-fn with_accuracy(picture: &Picture) -> Bytes {
-    [picture.accuracy.as_bytes(), b"\n", &picture.bytes]
-        .concat()
-        .into()
+/// What is kept of a picture: a line of its accuracy, a line of its report as JSON, the file.
+fn kept_form(picture: &Picture) -> Bytes {
+    let head = format!("{}\n{}\n", picture.accuracy, picture.report);
+    [head.as_bytes(), &picture.bytes].concat().into()
 }
 
-fn split(kept: &CachedResult) -> Result<(String, CachedResult), Problem> {
-    let end = kept.bytes.iter().position(|&byte| byte == b'\n');
-    let end = end.ok_or_else(|| Problem::internal("a kept picture without its accuracy"))?;
-    let accuracy = String::from_utf8_lossy(&kept.bytes[..end]).into_owned();
-    let bytes = kept.bytes.slice(end + 1..);
-    // The hash of both tells pictures apart as surely as that of one.
-    let hash = kept.hash;
-    Ok((accuracy, CachedResult { hash, bytes }))
+/// Accuracy, report and picture of what was kept.
+fn split(kept: &CachedResult) -> Result<(String, Bytes, CachedResult), Problem> {
+    let line_end = |from: usize| {
+        let end = kept.bytes[from..].iter().position(|&byte| byte == b'\n');
+        end.map(|end| from + end)
+            .ok_or_else(|| Problem::internal("a kept picture without its report"))
+    };
+    let first = line_end(0)?;
+    let second = line_end(first + 1)?;
+    let picture = CachedResult {
+        // The hash of all three tells pictures apart as surely as that of one.
+        hash: kept.hash,
+        bytes: kept.bytes.slice(second + 1..),
+    };
+    let accuracy = String::from_utf8_lossy(&kept.bytes[..first]).into_owned();
+    Ok((accuracy, kept.bytes.slice(first + 1..second), picture))
+}
+
+/// A picture that was drawn, now or before.
+struct Drawn {
+    accuracy: String,
+    report: Bytes,
+    picture: CachedResult,
+    time: Duration,
+}
+
+impl Drawn {
+    fn answer(self, format: PreviewFormat, picked: Option<&Picked>) -> Answer {
+        // What a target picks may change with the machine's load.
+        let keep = picked.map_or(Keep::ForEver, |_| Keep::Revalidated);
+        let answer = match format {
+            PreviewFormat::Json => Answer::bytes("application/json", self.report, keep),
+            _ => Answer::result(format.drawn().media_type(), self.picture, keep),
+        };
+        answer
+            .picked(picked)
+            .header(ACCURACY, &self.accuracy)
+            .stage("preview", self.time)
+    }
 }

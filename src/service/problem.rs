@@ -14,6 +14,7 @@ use utoipa::ToSchema;
 
 use super::works::{Fault, WorkError};
 use crate::store::StoreError;
+use crate::workshop::accepted;
 
 /// Media type of a problem.
 pub const MEDIA_TYPE: &str = "application/problem+json";
@@ -43,6 +44,8 @@ pub enum Kind {
     JobEnded,
     /// The job that was waited for was cancelled.
     JobCancelled,
+    /// The idempotency key stood with another request.
+    KeyUsed,
     /// The body is too large.
     TooLarge,
     /// The body is of a kind that is not read.
@@ -69,6 +72,8 @@ pub enum Place {
     Query,
     /// A part of the address.
     Path,
+    /// A header.
+    Header,
 }
 
 /// Something that went wrong with a request.
@@ -111,7 +116,7 @@ pub struct ProblemDocument {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::MalformedRequest,
         Self::InvalidParameter,
         Self::UnknownAddress,
@@ -123,6 +128,7 @@ impl Kind {
         Self::RequestTimeout,
         Self::JobEnded,
         Self::JobCancelled,
+        Self::KeyUsed,
         Self::TooLarge,
         Self::UnsupportedMediaType,
         Self::InvalidValue,
@@ -182,6 +188,11 @@ impl Kind {
                 "job-cancelled",
                 "The job was cancelled",
                 StatusCode::CONFLICT,
+            ),
+            Self::KeyUsed => (
+                "idempotency-key-used",
+                "This idempotency key was used for another request",
+                StatusCode::UNPROCESSABLE_ENTITY,
             ),
             Self::TooLarge => (
                 "too-large",
@@ -285,6 +296,31 @@ impl Problem {
         self
     }
 
+    /// The same problem where parameters stand in the body; a field of one name has another there.
+    #[must_use]
+    pub fn in_body(mut self, from: &str, to: &str) -> Self {
+        if self.kind == Kind::InvalidParameter {
+            self.kind = Kind::InvalidValue;
+            let pointer = self.field.map_or(String::new(), |(_, pointer)| pointer);
+            let named = pointer.strip_prefix('/').filter(|name| *name == from);
+            self.field = Some((
+                Place::Body,
+                named.map_or(pointer.clone(), |_| format!("/{to}")),
+            ));
+        }
+        self
+    }
+
+    /// The same problem of what a value in the body names.
+    #[must_use]
+    pub fn as_value(self, field: &str) -> Self {
+        Self {
+            kind: Kind::InvalidValue,
+            field: Some((Place::Body, format!("/{field}"))),
+            ..self
+        }
+    }
+
     /// What kind of problem it is.
     #[must_use]
     pub const fn kind(&self) -> Kind {
@@ -350,9 +386,22 @@ impl WorkError {
     /// The problem with an upload, or with the query that came with it.
     #[must_use]
     pub fn of_upload(self) -> Problem {
-        match self.fault {
-            Fault::Upload => Problem::new(Kind::UnusableMeasurement, self.message),
-            _ => self.of_query(),
+        if self.fault != Fault::Upload {
+            return self.of_query();
+        }
+        let problem = Problem::new(Kind::UnusableMeasurement, &*self.message);
+        self.accepting(match &self.field {
+            Some(field) => problem.at(Place::Query, format!("/{field}")),
+            // The body as a whole.
+            None => problem.at(Place::Body, ""),
+        })
+    }
+
+    /// Says what would be accepted, where the message does.
+    fn accepting(&self, problem: Problem) -> Problem {
+        match accepted(&self.message) {
+            Some(what) => problem.accepting(what),
+            None => problem,
         }
     }
 
@@ -361,8 +410,11 @@ impl WorkError {
     pub fn of_query(self) -> Problem {
         match (self.fault, &self.field) {
             (Fault::Internal, _) => Problem::internal(self.message),
-            (_, Some(field)) => Problem::parameter(field.trim_start_matches('-'), &*self.message),
-            (_, None) => Problem::new(Kind::InvalidParameter, self.message),
+            (_, Some(field)) => self.accepting(Problem::parameter(
+                field.trim_start_matches('-'),
+                &*self.message,
+            )),
+            (_, None) => self.accepting(Problem::new(Kind::InvalidParameter, &*self.message)),
         }
     }
 
@@ -371,11 +423,11 @@ impl WorkError {
     pub fn of_body(self) -> Problem {
         match (self.fault, &self.field) {
             (Fault::Internal, _) => Problem::internal(self.message),
-            (_, Some(field)) => Problem::value(
+            (_, Some(field)) => self.accepting(Problem::value(
                 format!("/{}", field.trim_start_matches('-')),
                 &*self.message,
-            ),
-            (_, None) => Problem::new(Kind::InvalidValue, self.message),
+            )),
+            (_, None) => self.accepting(Problem::new(Kind::InvalidValue, &*self.message)),
         }
     }
 }
@@ -400,7 +452,10 @@ pub fn finish(mut response: Response, request_id: &str) -> Response {
         .remove::<Problem>()
         .unwrap_or_else(|| of_status(&response));
     let document = problem.document(Some(request_id));
-    let body = serde_json::to_vec(&document).unwrap_or_default();
+    let body = serde_json::to_vec(&document).unwrap_or_else(|error| {
+        tracing::error!(%error, "a problem does not serialise");
+        br#"{"type":"/problems/internal","status":500}"#.to_vec()
+    });
     let mut finished = HttpResponse::new(Body::from(body));
     *finished.status_mut() = problem.kind.told().2;
     let headers = finished.headers_mut();

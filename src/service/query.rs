@@ -385,6 +385,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn any_query_is_read_or_refused(query in "\\PC{0,40}") {
             let _ = ask(&query);

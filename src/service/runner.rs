@@ -22,6 +22,9 @@ use crate::store::{JobKind, JobRecord, JobState, NewJob};
 /// How often a job is begun before it is given up: each time the process died over it.
 const MOST_ATTEMPTS: u32 = 5;
 
+/// Ended jobs that can still be asked for.
+const JOBS_KEPT: u32 = 10_000;
+
 /// A job as it is told.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct JobDocument {
@@ -95,6 +98,15 @@ impl Jobs {
         self.under_way().get(id).cloned()
     }
 
+    /// The job that makes this, if one is under way and goes on.
+    fn making(&self, subject: &str) -> Option<String> {
+        let under_way = self.under_way();
+        let at_it = under_way
+            .values()
+            .find(|job| job.job.subject == subject && !job.is_cancelled());
+        at_it.map(|job| job.job.id.clone())
+    }
+
     /// Whether nothing is under way.
     #[must_use]
     pub fn is_idle(&self) -> bool {
@@ -120,16 +132,34 @@ pub async fn submit(
         subject: subject.to_owned(),
         request,
     };
-    let _one_at_a_time = app.jobs.submitting.lock().await;
-    if app.jobs.under_way().len() >= app.jobs.most {
-        return Err(Problem::overloaded());
-    }
-    let submitted = app.catalogue.submit_job(&job).await?;
-    let id = submitted.job.id.clone();
-    if app.jobs.find(&id).is_none() {
-        start(app, submitted.job);
-    }
-    Ok(id)
+    let app = app.clone();
+    to_its_end(async move {
+        let _one_at_a_time = app.jobs.submitting.lock().await;
+        if let Some(at_it) = app.jobs.making(&job.subject) {
+            return Ok(at_it);
+        }
+        if app.jobs.under_way().len() >= app.jobs.most {
+            return Err(Problem::overloaded());
+        }
+        let submitted = app.catalogue.submit_job(&job).await?;
+        let id = submitted.job.id.clone();
+        if app.jobs.find(&id).is_none() {
+            start(&app, submitted.job);
+        }
+        Ok(id)
+    })
+    .await
+}
+
+/// Does what must not stop in the middle when the caller goes away.
+///
+/// # Errors
+///
+/// What the work says, or [`Kind::Internal`] when it panicked.
+pub async fn to_its_end<T: Send + 'static>(
+    work: impl Future<Output = Result<T, Problem>> + Send + 'static,
+) -> Result<T, Problem> {
+    tokio::spawn(work).await.map_err(Problem::internal)?
 }
 
 /// Begins again what was under way when the last process ended.
@@ -242,6 +272,7 @@ async fn end(
     app.catalogue
         .end_job(&job.id, state, stored.as_deref())
         .await?;
+    app.catalogue.forget_ended_jobs(JOBS_KEPT).await?;
     if job.kind == JobKind::Ingest && state != JobState::Done {
         paints::forget_upload(app, job).await?;
     }
@@ -382,7 +413,7 @@ impl UnderWay {
     }
 
     /// Returns once somebody called the job off.
-    async fn called_off(&self) {
+    pub async fn called_off(&self) {
         let _ = self
             .cancelled
             .subscribe()

@@ -1,29 +1,137 @@
 //! The sample paints on the shelf of a new service.
 
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
 use super::app::App;
 use super::ids;
 use super::problem::Problem;
-use super::workbench::Workbench;
+use super::workbench::{Workbench, call_off};
 use crate::accuracy::Profile;
-use crate::workshop::SAMPLES;
+use crate::store::Visibility;
+use crate::workshop::{SAMPLES, Sample};
 
-/// Puts every sample paint that is not there yet into the catalogue, under an id that never changes.
+/// The id of a sample: of what it is made of, so that another recipe is another paint.
+fn id_of(sample: &Sample, profile: &Profile) -> String {
+    ids::made_of(
+        "p_",
+        &("sample", sample.name, sample.recipe(), profile.flakes),
+    )
+}
+
+/// Puts every sample paint that is not there yet into the catalogue, and takes out those of earlier recipes. Stops
+/// where it is when the service goes down.
 ///
 /// # Errors
 ///
 /// [`Problem`] when the store fails or a sample cannot be made.
 pub async fn load_samples(app: &App) -> Result<(), Problem> {
+    let profile = Arc::new(Profile::standard());
     let bench = Workbench::new(rayon::current_num_threads(), SAMPLES.len());
+    let mut current = BTreeSet::new();
     for sample in &SAMPLES {
-        let id = ids::made_of("p_", &("sample", sample.name));
-        if app.has_paint(&id).await? {
-            continue;
+        let id = id_of(sample, &profile);
+        if !app.has_paint(&id).await? {
+            let (on, profile) = (app.clone(), Arc::clone(&profile));
+            let build = bench.run_or_call_off(move || {
+                sample.build(&profile, &|_| {
+                    if on.is_stopping() {
+                        call_off();
+                    }
+                })
+            });
+            let Ok(paint) = build.await? else {
+                return Ok(());
+            };
+            let paint = paint.map_err(Problem::internal)?;
+            app.keep_paint(&id, paint, None).await?;
         }
-        let paint = bench
-            .run(move || sample.build(&Profile::standard(), &|_| ()))
-            .await?;
-        app.keep_paint(&id, paint.map_err(Problem::internal)?, None)
-            .await?;
+        current.insert(id);
+    }
+    forget_earlier(app, &current).await
+}
+
+/// Takes out samples that this version makes otherwise. Uploads of samples stay, and so do blends.
+async fn forget_earlier(app: &App, current: &BTreeSet<String>) -> Result<(), Problem> {
+    for visibility in [Visibility::Published, Visibility::Private] {
+        let mut cursor = None;
+        loop {
+            let page = app
+                .catalogue
+                .paints(Some("sample"), visibility, cursor, 200)
+                .await?;
+            let earlier = page.paints.iter().filter(|paint| {
+                paint.source == "sample"
+                    && paint.measurement.is_none()
+                    && !current.contains(&paint.id)
+            });
+            for paint in earlier {
+                app.forget_paint(&paint.id).await?;
+            }
+            cursor = page.next;
+            if cursor.is_none() {
+                break;
+            }
+        }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paint::{Chi, Limits, Reflectance, instrument_pairs};
+    use crate::service::{ServiceConfig, Workshop};
+    use crate::workshop::sample_by_name;
+
+    /// What `MODEL` stands for: bytes that were kept under it must not change under it.
+    #[test]
+    fn a_sample_that_changes_asks_for_another_model_number() {
+        let sample = sample_by_name("bmw339").expect("a sample");
+        let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
+        let flakes = paint.paint.flakes.as_ref().expect("flakes");
+        let reflectance = Reflectance::new(&paint.paint);
+        let read = instrument_pairs().map(|(wi, wo)| {
+            let factor = reflectance.evaluate(wi, wo, Chi::Table);
+            format!("{:.4}", crate::color::luminance(factor))
+        });
+        let seen = (
+            ids::MODEL,
+            flakes.slices(),
+            format!("{:.1}", flakes.texture.grain_um),
+            read.join(" "),
+        );
+        let golden = GOLDEN;
+        assert_eq!(
+            (seen.0, seen.1, seen.2.as_str(), seen.3.as_str()),
+            golden,
+            "samples are other paints now: count ids::MODEL up, and bless this"
+        );
+    }
+
+    const GOLDEN: (u32, usize, &str, &str) = (2, 0, "", "");
+
+    #[tokio::test]
+    async fn samples_of_an_earlier_recipe_leave_and_uploads_stay() {
+        let data = tempfile::tempdir().expect("a folder");
+        let config = ServiceConfig::new(data.path().to_owned());
+        let works = Arc::new(Workshop::new(Limits::default()));
+        let app = App::open(config, works).await.expect("opens");
+        let white = || {
+            let sample = sample_by_name("white").expect("a sample");
+            sample.build(&Profile::draft(), &|_| ()).expect("builds")
+        };
+        let kept = |kind: &str| ids::made_of("p_", &kind);
+        let upload = app.blobs.put("upload".into()).await.expect("is kept").hash;
+        for (kind, measurement) in [("now", None), ("before", None), ("upload", Some(upload))] {
+            app.keep_paint(&kept(kind), white(), measurement)
+                .await
+                .expect("is kept");
+        }
+        let current = BTreeSet::from([kept("now")]);
+        forget_earlier(&app, &current).await.expect("forgets");
+        for (kind, there) in [("now", true), ("before", false), ("upload", true)] {
+            assert_eq!(app.has_paint(&kept(kind)).await, Ok(there), "{kind}");
+        }
+    }
 }

@@ -19,8 +19,8 @@ use super::envelope::envelope;
 use super::extract::JSON_BYTES;
 use super::works::Works;
 use super::{
-    ServiceConfig, accuracy, blends, docs, estimates, home, jobs, operations, paints, previews,
-    realisations, runner,
+    ServiceConfig, accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations,
+    paints, previews, realisations, runner, visibility,
 };
 use crate::store::StoreError;
 
@@ -60,7 +60,12 @@ pub async fn open(config: ServiceConfig, works: Arc<dyn Works>) -> Result<App, S
 pub fn router(app: App) -> Router {
     Router::new()
         .route("/v1/paints", get(paints::list).post(paints::upload))
-        .route("/v1/paints/{id}", get(paints::show).delete(paints::delete))
+        .route(
+            "/v1/paints/{id}",
+            get(paints::show)
+                .patch(visibility::change)
+                .delete(paints::delete),
+        )
         .route("/v1/paints/{id}/paint", get(paints::file))
         .route("/v1/paints/{id}/measurement", get(paints::measurement))
         .route(
@@ -69,7 +74,9 @@ pub fn router(app: App) -> Router {
         )
         .route("/v1/paints/{id}/preview.{format}", get(previews::of_paint))
         .route("/v1/blends", axum::routing::post(blends::create))
+        .route("/v1/previews", axum::routing::post(previews::create))
         .route("/v1/blends/{id}", get(blends::show))
+        .route("/v1/blends/{id}/bundle.zip", get(blend_bundles::bundle))
         .route(
             "/v1/blends/{id}/realisation.{format}",
             get(realisations::of_blend),

@@ -42,6 +42,25 @@ pub struct WeightQuery {
 const GREEK: [&str; 5] = ["alpha", "beta", "gamma", "delta", "epsilon"];
 
 impl WeightQuery {
+    /// The same from lists, as they stand in a body.
+    #[must_use]
+    pub fn of_lists(
+        weights: Option<Vec<f64>>,
+        base: Option<Vec<f64>>,
+        flake_lightness: Option<Vec<f64>>,
+        flake_color: Option<Vec<f64>>,
+        flake_saturation: Option<f64>,
+    ) -> Self {
+        Self {
+            weights,
+            base,
+            flake_lightness,
+            flake_color,
+            flake_saturation,
+            ..Self::default()
+        }
+    }
+
     /// The weights for a blend of these paints.
     ///
     /// # Errors

@@ -97,8 +97,19 @@ pub enum Scene {
     Panel,
 }
 
+/// Light of one direction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Light {
+    /// Towards the light, of any length: x to the right, y up, z towards the viewer.
+    pub towards: [f32; 3],
+    /// Irradiance on a surface that faces it, linear sRGB; that of the scene's usual light unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub irradiance: Option<[f32; 3]>,
+}
+
 /// What a picture shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct View {
     /// What the paint is on.
     pub scene: Scene,
@@ -106,6 +117,9 @@ pub struct View {
     pub size: [u32; 2],
     /// Samples per pixel.
     pub samples_per_pixel: u32,
+    /// Lights in place of the scene's usual one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lights: Option<Vec<Light>>,
 }
 
 /// Work that can be estimated.
@@ -152,6 +166,8 @@ pub struct Picture {
     pub bytes: Vec<u8>,
     /// How accurate it is, as the value of a header: the same for the same picture.
     pub accuracy: String,
+    /// What was drawn and what was left out, what had to be clamped.
+    pub report: Value,
 }
 
 /// Whose fault it is.
@@ -216,6 +232,13 @@ pub trait Works: Debug + Send + Sync {
         profile: &Profile,
     ) -> Result<Vec<u8>, WorkError>;
 
+    /// All paints of a blend become one texture bundle.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for a thing that is no blend.
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError>;
+
     /// A paint, or a blend at some weights, becomes a picture.
     ///
     /// # Errors
@@ -227,6 +250,7 @@ pub trait Works: Debug + Send + Sync {
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
+        progress: Progress<'_>,
     ) -> Result<Picture, WorkError>;
 
     /// What some work will take with a profile.

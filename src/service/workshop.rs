@@ -5,14 +5,14 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Asked, Estimate, Fault, Format, IngestOrder, Layout, Picked, Picture, PictureFormat, Progress,
-    Scene, Target, ThetaH, Thing, View, WorkError, Works,
+    Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
+    Progress, Scene, Target, ThetaH, Thing, View, WorkError, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::measurement::{self, ReadOptions, ThetaHSpacing};
 use crate::paint::{Limits, PaintFile};
-use crate::workshop::{self, IngestOptions, PreviewOptions, Work, WorkshopError};
+use crate::workshop::{self, IngestOptions, PreviewLight, PreviewOptions, Work, WorkshopError};
 
 /// Does the work, within limits.
 #[derive(Clone, Copy, Debug)]
@@ -131,6 +131,13 @@ fn options_of(view: &View) -> PreviewOptions {
         size: view.size,
         samples_per_pixel: view.samples_per_pixel,
         environment: None,
+        lights: view.lights.as_ref().map(|lights| {
+            let light = |light: &Light| PreviewLight {
+                towards: light.towards,
+                irradiance: light.irradiance,
+            };
+            lights.iter().map(light).collect()
+        }),
     }
 }
 
@@ -165,15 +172,20 @@ impl Works for Workshop {
         Ok(workshop::realise(thing, weights, format, profile)?.bytes)
     }
 
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError> {
+        Ok(workshop::bundle_blend(blend, profile)?.bytes)
+    }
+
     fn preview(
         &self,
         thing: &Thing,
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
+        progress: Progress<'_>,
     ) -> Result<Picture, WorkError> {
         let (options, format) = (options_of(view), picture_of(format));
-        let made = workshop::preview(thing, weights, &options, format, &self.limits, &|_| ())?;
+        let made = workshop::preview(thing, weights, &options, format, &self.limits, progress)?;
         let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
         let mut accuracy = Vec::new();
         for (name, path) in [
@@ -186,6 +198,7 @@ impl Works for Workshop {
         Ok(Picture {
             bytes: made.bytes,
             accuracy: accuracy.join(", "),
+            report: made.report,
         })
     }
 

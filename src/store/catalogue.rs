@@ -21,6 +21,18 @@ pub struct PaintRecord {
     pub paint: Hash,
     /// Hash of the physical content: equal for equal paints of different names.
     pub content: Hash,
+    /// Whether lists show it.
+    pub visibility: Visibility,
+}
+
+/// Whether lists show a paint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Visibility {
+    /// They do.
+    #[default]
+    Published,
+    /// Only where private paints are asked for.
+    Private,
 }
 
 /// A page of paints, in the order they came.
@@ -120,13 +132,17 @@ pub trait Paints: Send + Sync {
     /// The paint of this id.
     fn paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>>;
 
-    /// Up to `limit` paints whose name or source contains `q`, whatever the case, from `cursor` on.
+    /// Up to `limit` paints of this visibility whose name or source contains `q`, whatever the case, from `cursor` on.
     fn paints<'a>(
         &'a self,
         q: Option<&'a str>,
+        visibility: Visibility,
         cursor: Option<i64>,
         limit: u32,
     ) -> Task<'a, PaintPage>;
+
+    /// Changes whether lists show a paint; `false` when there is none.
+    fn show_paint<'a>(&'a self, id: &'a str, visibility: Visibility) -> Task<'a, bool>;
 
     /// Removes a paint and hands out what was on record.
     fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>>;
@@ -158,6 +174,9 @@ pub trait JobBook: Send + Sync {
     /// Marks a begun job as queued again, as if it had not been begun.
     fn return_job<'a>(&'a self, id: &'a str) -> Task<'a, ()>;
 
+    /// Forgets ended jobs, but for those that came last.
+    fn forget_ended_jobs(&self, keep: u32) -> Task<'_, ()>;
+
     /// Ends an unfinished job as done, failed or cancelled. `false` when it had ended already.
     fn end_job<'a>(
         &'a self,
@@ -172,8 +191,28 @@ pub trait Catalogue: Paints + Blends + JobBook {
     /// Asks the backend for a sign of life.
     fn ping(&self) -> Task<'_, ()>;
 
+    /// Ties a key to a subject unless it is tied, and says to which. Beyond `keep` keys the oldest are forgotten.
+    fn tie_key<'a>(&'a self, key: &'a str, subject: &'a str, keep: u32) -> Task<'a, String>;
+
     /// Whether a paint, a blend or the request of an unfinished job names this blob.
     fn names_blob(&self, blob: Hash) -> Task<'_, bool>;
+}
+
+impl Visibility {
+    /// The word that is stored.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Published => "published",
+            Self::Private => "private",
+        }
+    }
+
+    pub(super) fn of_word(word: &str) -> Option<Self> {
+        [Self::Published, Self::Private]
+            .into_iter()
+            .find(|visibility| visibility.word() == word)
+    }
 }
 
 impl JobState {

@@ -93,6 +93,7 @@ fn paint(id: &str, name: &str, measurement: Option<Hash>) -> PaintRecord {
         measurement,
         paint: Hash::of(id.as_bytes()),
         content: Hash::of(b"content"),
+        visibility: Visibility::Published,
     }
 }
 
@@ -135,7 +136,10 @@ async fn records_conform(catalogue: &dyn Catalogue) {
     );
     assert!(catalogue.paint("p_9").await.expect("reads").is_none());
 
-    let all = catalogue.paints(None, None, 10).await.expect("lists");
+    let all = catalogue
+        .paints(None, Visibility::Published, None, 10)
+        .await
+        .expect("lists");
     assert_eq!(
         (names(&all), all.next),
         (vec!["Æther 50 % silver", "blue", "Silver_blue"], None)
@@ -151,7 +155,7 @@ async fn records_conform(catalogue: &dyn Catalogue) {
     ] {
         assert_eq!(
             catalogue
-                .paints(Some(q), None, 10)
+                .paints(Some(q), Visibility::Published, None, 10)
                 .await
                 .expect("lists")
                 .paints
@@ -160,8 +164,42 @@ async fn records_conform(catalogue: &dyn Catalogue) {
             "{q}"
         );
     }
-    let first = catalogue.paints(None, None, 2).await.expect("lists");
-    let rest = catalogue.paints(None, first.next, 2).await.expect("lists");
+    let list = |visibility| catalogue.paints(None, visibility, None, 10);
+    let hidden = catalogue.show_paint("p_2", Visibility::Private).await;
+    assert!(hidden.expect("changes"));
+    let private = list(Visibility::Private).await.expect("lists");
+    let published = list(Visibility::Published).await.expect("lists");
+    assert_eq!(
+        (names(&private), names(&published).len()),
+        (vec!["blue"], 2)
+    );
+    let shown = catalogue.show_paint("p_2", Visibility::Published).await;
+    assert!(shown.expect("changes"));
+    let nobody = catalogue.show_paint("p_9", Visibility::Private).await;
+    assert!(!nobody.expect("changes nothing"));
+
+    for (key, subject, tied) in [
+        ("k", "p_1", "p_1"),
+        ("k", "p_2", "p_1"),
+        ("l", "p_2", "p_2"),
+    ] {
+        let told = catalogue.tie_key(key, subject, 2).await;
+        assert_eq!(told.expect("ties"), tied);
+    }
+    for key in ["m", "n"] {
+        catalogue.tie_key(key, "p_3", 2).await.expect("ties");
+    }
+    let again = catalogue.tie_key("k", "p_2", 2).await;
+    assert_eq!(again.expect("ties"), "p_2", "the oldest key was forgotten");
+
+    let first = catalogue
+        .paints(None, Visibility::Published, None, 2)
+        .await
+        .expect("lists");
+    let rest = catalogue
+        .paints(None, Visibility::Published, first.next, 2)
+        .await
+        .expect("lists");
     assert_eq!(
         (names(&first).len(), names(&rest), rest.next),
         (2, vec!["Silver_blue"], None)
@@ -211,7 +249,7 @@ async fn records_conform(catalogue: &dyn Catalogue) {
     assert!(!named(upload).await);
     assert!(
         catalogue
-            .paints(None, None, 10)
+            .paints(None, Visibility::Published, None, 10)
             .await
             .expect("lists")
             .paints

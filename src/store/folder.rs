@@ -49,6 +49,11 @@ impl FolderBlobs {
                 fs::remove_dir_all(&incoming)?;
             }
             fs::create_dir_all(&incoming)?;
+            // All folders there will ever be, so that no blob waits for the name of its folder to be durable.
+            for first in 0..=u8::MAX {
+                fs::create_dir_all(blobs.join(format!("{first:02x}")))?;
+            }
+            sync_folder(&blobs)?;
             sync_folder(root)
         };
         make().map_err(StoreError::io(format!(
@@ -222,7 +227,8 @@ impl BlobWriter for FolderWriter {
             let file = NamedTempFile::from_parts(self.file.into_std().await, self.path);
             off_thread(move || {
                 if place.exists() {
-                    Ok(())
+                    // Whoever wrote it may not have come to this yet.
+                    place.parent().map_or(Ok(()), sync_folder)
                 } else {
                     appear(file, &place, Durability::Synced)
                 }

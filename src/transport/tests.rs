@@ -354,6 +354,7 @@ fn sinkhorn_keeps_its_promise_or_says_that_it_cannot() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn on_a_line_the_cost_is_the_sorted_one(source in line(), target in line()) {
         let problem = line_problem(&source, &target);

@@ -2,9 +2,10 @@
 
 use super::WorkshopError;
 use crate::accuracy::{Profile, blend_deviation, left_out_w1};
-use crate::blend::{Blend, BlendError, Ingredient};
+use crate::blend::{Blend, BlendError, Ingredient, Origin, Reduction};
 use crate::fit::{ClusterSettings, reduce_clusters};
-use crate::paint::{CarPaint, Clustering, PaintFile};
+use crate::paint::{CarPaint, Clustering, Flakes, PaintFile};
+use crate::transport::TransportError;
 
 /// A new blend and what was done on the way.
 #[derive(Clone, Debug)]
@@ -43,30 +44,53 @@ pub fn blend_paints(
             BlendError::Paints(_) | BlendError::Angles { .. } => {
                 WorkshopError::usage("paints", error)
             }
+            BlendError::Transport {
+                source: TransportError::TooManyPoints { .. },
+                ..
+            } => WorkshopError::usage(
+                "clusters",
+                format!("{error}: blend paints with fewer clusters, or fewer paints"),
+            ),
             _ => WorkshopError::internal(error),
         })?;
+    let origins = paints.iter().zip(&reduced).map(|(file, reduced)| Origin {
+        simulated_flakes: file.provenance.simulated_flakes,
+        reduced: reduced.as_ref().map(|fewer| Reduction {
+            from: widest(&file.paint),
+            to: widest(fewer),
+        }),
+    });
     let deviation =
         blend_deviation(&ingredients, &profile.blend).map_err(WorkshopError::internal)?;
     let clusterings: Vec<_> = paints
         .iter()
         .map(|file| clustering_of(file, &profile.flakes))
         .collect();
-    let blend = blend.with_accuracy(deviation, &clusterings);
-    let by_hash: Vec<&str> = blend.paints.iter().map(|p| p.name.as_str()).collect();
+    let blend = blend
+        .with_origins(origins)
+        .with_accuracy(deviation, &clusterings);
     let report = blend.report();
+    let named = |place: usize| {
+        let asked = blend.asked_at(place).and_then(|k| paints.get(k));
+        asked.map_or("", |file| file.name.as_str())
+    };
     for &place in &report.mixed {
         notes.push(format!(
             "{}: its angles differ from the common grid of {} slices; slices in between are mixtures of their neighbours",
-            by_hash[place], report.slices
+            named(place), report.slices
         ));
     }
     for &place in &report.without_flakes {
         notes.push(format!(
             "{}: has no flakes and counts as black ones",
-            by_hash[place]
+            named(place)
         ));
     }
     Ok(Blended { blend, notes })
+}
+
+fn widest(paint: &CarPaint) -> usize {
+    paint.flakes.as_ref().map_or(0, Flakes::widest_slice)
 }
 
 /// How a paint's flakes were clustered, and what leaving out angles now costs.

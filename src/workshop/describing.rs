@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::accuracy::{blend_error, paint_error, sparkle};
-use crate::blend::Blend;
+use crate::blend::{Blend, Order};
 use crate::paint::{ASPECULAR_DEG, Chi, PaintFile, Reflectance, instrument_pairs};
 
 /// Parameters, readings, residuals with their floor, energy certificate, flake statistics and warnings of a paint.
@@ -49,9 +49,43 @@ pub fn describe_paint(file: &PaintFile) -> Value {
         "error": paint_error(file),
         "readings": { "illuminant": "D65", "observer": "2", "illumination_deg": 45, "rows": readings },
         "residuals": file.residuals,
+        "multi_angle": file.readings,
+        "clamps": file.provenance.realisation.as_ref().map_or(&[][..], |of| &of.clamps),
         "energy": file.energy,
         "warnings": file.warnings,
     })
+}
+
+/// How the paints of a blend correspond. Paints are named, with their place in the order asked for.
+pub(super) fn describe_correspondence(blend: &Blend) -> Value {
+    let names: Vec<&str> = blend.ingredients().map(|(name, _)| name).collect();
+    let report = blend.report();
+    let told = |places: &[usize]| -> Vec<Value> {
+        let asked = places.iter().filter_map(|&place| blend.asked_at(place));
+        asked
+            .map(|k| json!({ "place": k, "name": names[k] }))
+            .collect()
+    };
+    let reduced: Vec<Value> = blend
+        .origins()
+        .enumerate()
+        .filter_map(|(k, origin)| origin.reduced.map(|by| (k, by)))
+        .map(|(k, by)| json!({ "place": k, "name": names[k], "from": by.from, "to": by.to }))
+        .collect();
+    let mut correspondence = json!(report);
+    correspondence["mixed"] = told(&report.mixed).into();
+    correspondence["without_flakes"] = told(&report.without_flakes).into();
+    correspondence["reduced"] = reduced.into();
+    // Weights follow the order asked for; the paints are joined in this one.
+    correspondence["order"] = match blend.settings().order {
+        Order::Canonical => "content hash".into(),
+        Order::Cheapest => "cheapest".into(),
+    };
+    correspondence["joined"] = told(&report.order).into();
+    for (k, pair) in report.pairs.iter().enumerate() {
+        correspondence["pairs"][k]["paints"] = told(&pair.paints).into();
+    }
+    correspondence
 }
 
 /// Ingredients, settings and correspondence of a blend.
@@ -59,13 +93,14 @@ pub fn describe_paint(file: &PaintFile) -> Value {
 pub fn describe_blend(blend: &Blend) -> Value {
     let paints: Vec<Value> = blend
         .ingredients()
-        .map(|(name, hash)| json!({ "name": name, "hash": hash }))
+        .zip(blend.origins())
+        .map(|((name, hash), origin)| json!({ "name": name, "hash": hash, "simulated_flakes": origin.simulated_flakes }))
         .collect();
     json!({
         "paints": paints,
         "weights": format!("{} numbers, in this order", blend.len()),
         "settings": blend.settings(),
-        "correspondence": blend.report(),
+        "correspondence": describe_correspondence(blend),
         "error": blend_error(blend),
         "flakes": blend.flakes.as_ref().map(|f| json!({
             "theta_h_deg": f.theta_h.degrees(),

@@ -27,6 +27,22 @@ pub struct WorkshopError {
     pub message: String,
 }
 
+/// What a message says would be accepted: all of this crate's errors end in it, as "…, accepted is 1 to 4".
+#[must_use]
+pub fn accepted(message: &str) -> Option<&str> {
+    [
+        "accepted is ",
+        "accepted are ",
+        "; there are ",
+        "ends in neither ",
+        "ends in none of ",
+    ]
+    .iter()
+    .find_map(|words| message.rsplit_once(words))
+    .map(|(_, what)| what.split(';').next().unwrap_or(what).trim_end_matches('.'))
+    .filter(|what| !what.is_empty())
+}
+
 impl WorkshopError {
     /// A request that does not fit together.
     pub fn usage(field: &str, message: impl Display) -> Self {
@@ -72,5 +88,29 @@ impl From<crate::blend::WeightError> for WorkshopError {
             W::Count { field, .. } | W::Value { field, .. } => field,
         };
         Self::usage(field, &error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_would_be_accepted_is_found_in_the_message() {
+        let cases = [
+            ("coat_ior is 5, accepted is 1 to 4", Some("1 to 4")),
+            (
+                "there is no scene 'cube'; there are sphere, capsule and panel",
+                Some("sphere, capsule and panel"),
+            ),
+            (
+                "12 pixels, accepted are up to 9: try less",
+                Some("up to 9: try less"),
+            ),
+            ("the archive is cut", None),
+        ];
+        for (message, what) in cases {
+            assert_eq!(accepted(message), what);
+        }
     }
 }

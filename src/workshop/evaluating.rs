@@ -97,10 +97,10 @@ pub fn evaluate(paint: &CarPaint, pairs: &Pairs, chi: Chi) -> Values {
 /// [`WorkshopError`] for a package whose table or pictures are damaged.
 pub fn evaluate_raw(measurement: &Measurement, pairs: &Pairs) -> Result<Values, WorkshopError> {
     let f = match measurement {
-        Measurement::Brdf(brdf, _) => pairs
+        Measurement::Brdf(bare) => pairs
             .pairs
             .iter()
-            .map(|&[wi, wo]| brdf.reflectance(wi, wo))
+            .map(|&[wi, wo]| bare.brdf.reflectance(wi, wo))
             .collect(),
         Measurement::Package(package) => raw_package(package, pairs)?,
     };

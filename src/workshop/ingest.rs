@@ -3,17 +3,23 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use super::content::content_hash;
 use super::thing::first_bytes;
 use super::{WorkshopError, read};
 use crate::accuracy::{Profile, clustering_error};
-use crate::fit::{CoatChoice, FittedBase, fit_base, fit_flakes};
+use crate::fit::{
+    CoatChoice, FittedBase, against_readings, fit_base, fit_base_telling, fit_flakes,
+};
 use crate::measurement::{
     BrdfMeasurement, HalfAngleTable, Layout, Package, PackageBase, ReadOptions, TableLayout,
-    ThetaHSpacing, read_merl, read_mpi,
+    ThetaHSpacing, read_merl, read_mpi, sniff,
 };
 use crate::paint::{
     CarPaint, Clustering, Coat, FitResiduals, Limits, PaintFile, Provenance, certify,
 };
+
+/// Characters a paint's name may have.
+pub const NAME_CHARACTERS: std::ops::RangeInclusive<usize> = 1..=crate::paint::NAME_CHARACTERS;
 
 /// How a measurement is ingested.
 #[derive(Clone, Debug, Default)]
@@ -60,8 +66,19 @@ impl IngestOptions {
 pub enum Measurement {
     /// A measured-paint package.
     Package(Box<Package>),
-    /// A bare table or tensor, with the BLAKE3 of its bytes.
-    Brdf(Box<BrdfMeasurement>, blake3::Hash),
+    /// A bare table or tensor.
+    Brdf(Box<BareMeasurement>),
+}
+
+/// A bare table or tensor.
+#[derive(Debug)]
+pub struct BareMeasurement {
+    /// What was measured.
+    pub brdf: BrdfMeasurement,
+    /// How its bytes were laid out.
+    pub layout: Layout,
+    /// BLAKE3 of its bytes.
+    pub hash: blake3::Hash,
 }
 
 /// Opens a measurement: what it is shows in its first bytes, unless the options say it.
@@ -82,10 +99,24 @@ pub fn open_measurement(
         let package = Package::open(path, &options.limits).map_err(|e| wrong(&e))?;
         return Ok(Measurement::Package(Box::new(package)));
     }
-    let bytes = read(path, &options.limits)?;
+    let held = Limits {
+        bytes: options.limits.bytes.min(options.limits.table_bytes),
+        ..options.limits
+    };
+    let bytes = read(path, &held)?;
+    // What is not recognised can be named.
+    let layout = sniff(&bytes, &options.read).map_err(|e| WorkshopError {
+        field: Some("layout".to_owned()),
+        ..wrong(&e)
+    })?;
     let brdf =
         BrdfMeasurement::read(&bytes, &options.read, &options.limits).map_err(|e| wrong(&e))?;
-    Ok(Measurement::Brdf(Box::new(brdf), blake3::hash(&bytes)))
+    let hash = blake3::hash(&bytes);
+    Ok(Measurement::Brdf(Box::new(BareMeasurement {
+        brdf,
+        layout,
+        hash,
+    })))
 }
 
 /// Fits a measurement: base, flakes, certificate. `progress` hears the share done.
@@ -98,23 +129,40 @@ pub fn ingest(
     options: &IngestOptions,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<PaintFile, WorkshopError> {
-    let name = match &options.name {
-        Some(name) => name.clone(),
-        None => path.file_stem().map_or_else(
-            || "paint".to_owned(),
-            |stem| stem.to_string_lossy().into_owned(),
-        ),
-    };
-    if !(1..=200).contains(&name.chars().count()) {
-        let problem = format!(
-            "the name has {} characters, accepted are 1 to 200",
-            name.chars().count()
-        );
-        return Err(WorkshopError::usage("name", problem));
+    let stem = path
+        .file_stem()
+        .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    ingest_called(path, options, |_| stem, progress)
+}
+
+/// Fits a measurement that has no name of its own as what `unnamed` calls it.
+fn ingest_called(
+    path: &Path,
+    options: &IngestOptions,
+    unnamed: impl FnOnce(&BareMeasurement) -> String,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<PaintFile, WorkshopError> {
+    if let Some(name) = &options.name {
+        let length = name.chars().count();
+        if !NAME_CHARACTERS.contains(&length) || name.chars().any(char::is_control) {
+            let problem = format!(
+                "the name has {length} characters, accepted are {} to {}, none of them control characters",
+                NAME_CHARACTERS.start(),
+                NAME_CHARACTERS.end()
+            );
+            return Err(WorkshopError::usage("name", problem));
+        }
     }
     let file = match open_measurement(path, options)? {
-        Measurement::Brdf(brdf, hash) => ingest_brdf(&brdf, hash, name, options),
-        Measurement::Package(package) => ingest_package(*package, options, progress),
+        Measurement::Brdf(bare) => {
+            let named = options.name.clone();
+            let name = named.unwrap_or_else(|| as_name(&unnamed(&bare), bare.layout));
+            ingest_brdf(&bare, name, options, progress)
+        }
+        Measurement::Package(package) => {
+            let hash = content_hash(path, &options.limits)?;
+            ingest_package(*package, hash, options, progress)
+        }
     }
     .map_err(|problem| WorkshopError::input(path.display(), problem))?;
     file.paint
@@ -141,7 +189,10 @@ pub fn ingest_upload(
         ..error
     };
     if !PaintFile::recognises(&first_bytes(path)?) {
-        return ingest(path, options, progress).map_err(named);
+        // The file is called by the hash of its bytes, which is no name: better what it says about itself.
+        let description =
+            |bare: &BareMeasurement| bare.brdf.description().unwrap_or_default().to_owned();
+        return ingest_called(path, options, description, progress).map_err(named);
     }
     let bytes = read(path, &options.limits).map_err(named)?;
     let mut paint = PaintFile::from_bytes(&bytes, &options.limits)
@@ -153,25 +204,33 @@ pub fn ingest_upload(
     Ok(paint)
 }
 
+/// A text as the name of a paint; where nothing is left of it, the layout's.
+fn as_name(text: &str, layout: Layout) -> String {
+    let printable = text.trim().chars().filter(|c| !c.is_control());
+    let name: String = printable.take(*NAME_CHARACTERS.end()).collect();
+    if name.is_empty() {
+        format!("unnamed {}", layout.name())
+    } else {
+        name
+    }
+}
+
 fn ingest_brdf(
-    brdf: &BrdfMeasurement,
-    hash: blake3::Hash,
+    bare: &BareMeasurement,
     name: String,
     options: &IngestOptions,
+    progress: &(dyn Fn(f32) + Sync),
 ) -> Result<PaintFile, String> {
+    let brdf = &bare.brdf;
     let coat = options
         .coat_ior
         .map_or(CoatChoice::ByResidual, CoatChoice::Ior);
-    let base = fit_base(brdf, coat).map_err(|e| e.to_string())?;
+    let base = fit_base_telling(brdf, coat, progress).map_err(|e| e.to_string())?;
     let mut warnings = brdf.warnings();
     warnings.extend(base.warnings.iter().cloned());
     let mut provenance = Provenance {
-        source: match brdf {
-            BrdfMeasurement::Rgl(_) => "rgl",
-            BrdfMeasurement::Table(_) => "table",
-        }
-        .to_owned(),
-        hashes: vec![hash.to_hex().to_string()],
+        source: bare.layout.name().to_owned(),
+        hashes: vec![bare.hash.to_hex().to_string()],
         ..Provenance::default()
     };
     if let Some(description) = brdf.description() {
@@ -192,6 +251,7 @@ fn ingest_brdf(
 
 fn ingest_package(
     package: Package,
+    hash: blake3::Hash,
     options: &IngestOptions,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<PaintFile, String> {
@@ -203,6 +263,12 @@ fn ingest_package(
             ior,
             ..coat.unwrap_or(Coat::smooth(ior))
         }),
+    };
+    // Share of the time that goes into the base: nothing where the lab fitted it, everything where there are no flakes.
+    let based = match (&package.base, &package.flakes) {
+        (Some(PackageBase::Table { .. }), Some(_)) => 0.4,
+        (Some(PackageBase::Table { .. }), None) => 1.0,
+        _ => 0.0,
     };
     let mut paint = match &package.base {
         None => {
@@ -224,7 +290,9 @@ fn ingest_package(
         Some(base @ PackageBase::Table { file, .. }) => {
             let table = table_of(base)?;
             let choice = CoatChoice::Inside(coat.map_or(1.0, |c| c.ior));
-            let base = fit_base(&table, choice).map_err(|e| format!("{file}: {e}"))?;
+            let tell = |share: f32| progress(based * share);
+            let base =
+                fit_base_telling(&table, choice, &tell).map_err(|e| format!("{file}: {e}"))?;
             warnings.extend(base.warnings.iter().cloned());
             residuals = Some(base.residuals.clone());
             base_paint(&base, coat)
@@ -234,7 +302,7 @@ fn ingest_package(
     if let Some(pictures) = &package.flakes {
         let tell = |done: usize, of: usize| {
             #[allow(clippy::cast_precision_loss)] // a progress bar
-            progress(done as f32 / of as f32);
+            progress(based + (1.0 - based) * done as f32 / of as f32);
             ControlFlow::Continue(())
         };
         let fitted =
@@ -247,14 +315,18 @@ fn ingest_package(
         });
     }
     let provenance = Provenance {
-        source: "package".to_owned(),
+        source: Layout::Package.name().to_owned(),
+        hashes: vec![hash.to_hex().to_string()],
         notes: package.notes,
         ..Provenance::default()
     };
     let name = options.name.clone().unwrap_or(package.name);
-    Ok(finish(
-        name, provenance, paint, residuals, clustering, warnings,
-    ))
+    let readings = package
+        .multi_angle
+        .as_ref()
+        .and_then(|readings| against_readings(&paint, readings));
+    let file = finish(name, provenance, paint, residuals, clustering, warnings);
+    Ok(PaintFile { readings, ..file })
 }
 
 /// Fits the table of a package inside its coat.
@@ -315,6 +387,7 @@ pub(super) fn finish(
         paint,
         clustering,
         residuals,
+        readings: None,
         energy,
         warnings,
     }

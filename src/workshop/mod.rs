@@ -4,6 +4,8 @@
 //! a function that hears the share done. Every failure is a [`WorkshopError`] that says whose fault it is.
 
 mod blending;
+mod bundling;
+mod content;
 mod describing;
 mod error;
 mod estimate;
@@ -12,19 +14,30 @@ mod ingest;
 mod previewing;
 mod realising;
 mod samples;
+mod selftest;
 mod study;
 mod target;
 mod thing;
 
 pub use blending::{Blended, blend_paints};
+pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};
-pub use error::{Fault, WorkshopError};
+pub use error::{Fault, WorkshopError, accepted};
 pub use estimate::{Estimate, EstimatedError, Stage, Work, sample_to_estimate};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
-pub use ingest::{IngestOptions, Measurement, ingest, ingest_upload, open_measurement};
-pub use previewing::{PictureFormat, PreviewOptions, preview, read_environment, texels};
+pub use ingest::{
+    BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, ingest, ingest_upload,
+    open_measurement,
+};
+pub use previewing::{
+    PictureFormat, PreviewLight, PreviewOptions, preview, read_environment, texels,
+};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
+pub use selftest::{Check, selftest};
 pub use study::{StudyOptions, study};
 pub use target::{Picked, Target};
 pub use thing::{Source, Thing, find, open, open_paint, read};
+
+#[cfg(test)]
+mod tests;

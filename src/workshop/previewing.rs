@@ -8,7 +8,9 @@ use super::realising::{Made, choose, error_of};
 use super::{Thing, WorkshopError, read};
 use crate::blend::RealisationWeights;
 use crate::paint::{CarPaint, Limits};
-use crate::render::{self, Environment, RenderError, SamplingError, Scene, Shape};
+use crate::render::{
+    self, DirectionalLight, Environment, RenderError, SamplingError, Scene, Shape,
+};
 
 /// What a picture shows.
 #[derive(Clone, Debug)]
@@ -21,6 +23,17 @@ pub struct PreviewOptions {
     pub samples_per_pixel: u32,
     /// Panorama that lights it; the built-in studio unless given.
     pub environment: Option<Environment>,
+    /// Lights in place of the usual one of the scene.
+    pub lights: Option<Vec<PreviewLight>>,
+}
+
+/// Light of one direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PreviewLight {
+    /// Towards the light, of any length.
+    pub towards: [f32; 3],
+    /// Irradiance on a surface that faces it, linear sRGB; that of the scene's usual light unless given.
+    pub irradiance: Option<[f32; 3]>,
 }
 
 /// What a picture is written as.
@@ -119,6 +132,14 @@ fn scene_of(options: &PreviewOptions, limits: &Limits) -> Result<Scene, Workshop
     scene.samples_per_pixel = options.samples_per_pixel;
     if let Some(environment) = &options.environment {
         scene = scene.in_environment(environment.clone());
+    }
+    if let Some(lights) = &options.lights {
+        let usual = DirectionalLight::key(shape).irradiance;
+        let light = |light: &PreviewLight| DirectionalLight {
+            towards: light.towards,
+            irradiance: light.irradiance.unwrap_or(usual),
+        };
+        scene.lights = lights.iter().map(light).collect();
     }
     scene.validate(limits).map_err(refused)?;
     Ok(scene)

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use super::describing::describe_correspondence;
 use super::{Thing, WorkshopError};
 use crate::accuracy::{
     Profile, ResultError, blend_error, file_error, paint_error, sparkle, writing_error,
 };
-use crate::blend::{Blend, Clamp, RealisationWeights};
+use crate::blend::{Blend, RealisationWeights};
 use crate::export::{self, About, ExportSettings};
-use crate::paint::{CarPaint, Clustering, PaintFile, Provenance, certify};
+use crate::paint::{CarPaint, Clamp, Clustering, PaintFile, Provenance, Realisation, certify};
 
 /// What a realisation is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -94,16 +95,7 @@ pub(super) fn choose(
 fn of_blend(blend: &Blend, weights: &RealisationWeights) -> Result<Chosen, WorkshopError> {
     let realised = blend.realise(weights)?;
     let (names, hashes): (Vec<&str>, Vec<&str>) = blend.ingredients().unzip();
-    let mut notes: Vec<String> = realised
-        .clamps
-        .iter()
-        .map(|c| {
-            format!(
-                "{}: {}, {} of {}, the worst by {:.4}",
-                c.field, c.bound, c.count, c.of, c.worst
-            )
-        })
-        .collect();
+    let mut notes: Vec<String> = realised.clamps.iter().map(Clamp::to_string).collect();
     for (what, sum) in ["base", "flake lightness", "flake color"]
         .iter()
         .zip(realised.weight_sums)
@@ -118,11 +110,20 @@ fn of_blend(blend: &Blend, weights: &RealisationWeights) -> Result<Chosen, Works
         "weights": weights,
         "weight_sums": realised.weight_sums,
         "clamps": realised.clamps,
-        "correspondence": blend.report(),
+        "correspondence": describe_correspondence(blend),
     });
     let provenance = Provenance {
         source: "blend".to_owned(),
         hashes: hashes.iter().map(|&h| h.to_owned()).collect(),
+        simulated_flakes: blend.origins().any(|origin| origin.simulated_flakes),
+        realisation: Some(Realisation {
+            paints: names.iter().map(|&name| name.to_owned()).collect(),
+            base: weights.base().to_vec(),
+            flake_lightness: weights.flake_lightness().to_vec(),
+            flake_color: weights.flake_color().to_vec(),
+            flake_saturation: weights.flake_saturation,
+            clamps: realised.clamps.clone(),
+        }),
         ..Provenance::default()
     };
     Ok(Chosen {
@@ -223,15 +224,7 @@ fn paint_file(chosen: &Chosen) -> PaintFile {
         paint: chosen.paint.clone(),
         clustering,
         residuals: None,
-        warnings: chosen
-            .clamps
-            .iter()
-            .map(|c| {
-                format!(
-                    "{}: {}, {} of {}, the worst by {:.4}",
-                    c.field, c.bound, c.count, c.of, c.worst
-                )
-            })
-            .collect(),
+        readings: None,
+        warnings: chosen.clamps.iter().map(Clamp::to_string).collect(),
     }
 }

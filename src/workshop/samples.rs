@@ -37,6 +37,7 @@ struct Sparkle {
     per_mm2: f64,
     radius_um: f64,
     tilt: f64,
+    tint_spread: f64,
     seed: u64,
 }
 
@@ -57,6 +58,7 @@ pub const SAMPLES: [Sample; 8] = [
             per_mm2: 500.0,
             radius_um: 14.0,
             tilt: 0.15,
+            tint_spread: 0.08,
             seed: 0xf8,
         }),
     },
@@ -75,6 +77,7 @@ pub const SAMPLES: [Sample; 8] = [
             per_mm2: 2400.0,
             radius_um: 11.0,
             tilt: 0.17,
+            tint_spread: 0.03,
             seed: 0x51,
         }),
     },
@@ -93,6 +96,7 @@ pub const SAMPLES: [Sample; 8] = [
             per_mm2: 1400.0,
             radius_um: 13.0,
             tilt: 0.17,
+            tint_spread: 0.04,
             seed: 0x71,
         }),
     },
@@ -111,6 +115,7 @@ pub const SAMPLES: [Sample; 8] = [
             per_mm2: 1900.0,
             radius_um: 12.0,
             tilt: 0.17,
+            tint_spread: 0.05,
             seed: 0x339,
         }),
     },
@@ -171,6 +176,16 @@ pub fn by_name(name: &str) -> Option<&'static Sample> {
 }
 
 impl Sample {
+    /// Everything that its paint is made of, in words: another recipe is another paint.
+    #[must_use]
+    pub fn recipe(&self) -> String {
+        let flakes = self.flakes.map(|sparkle| sparkle.recipe(&self.base()));
+        format!(
+            "{:?}",
+            (self.diffuse, self.weights, self.f0, self.alpha, flakes)
+        )
+    }
+
     /// Whether flakes are simulated for it.
     #[must_use]
     pub const fn is_metallic(&self) -> bool {
@@ -184,7 +199,10 @@ impl Sample {
     /// [`WorkshopError`] never: the recipes are in range.
     pub fn patch(&self) -> Result<Option<SimulatedPatch>, WorkshopError> {
         self.flakes
-            .map(|sparkle| SimulatedPatch::new(&self.base(), &sparkle.recipe()))
+            .map(|sparkle| {
+                let base = self.base();
+                SimulatedPatch::new(&base, &sparkle.recipe(&base))
+            })
             .transpose()
             .map_err(WorkshopError::internal)
     }
@@ -258,12 +276,24 @@ impl Sample {
     }
 }
 
+/// Roughness from which a lobe is the metal's and not the lacquer's.
+const METAL_ALPHA: f64 = 0.05;
+
 impl Sparkle {
-    fn recipe(&self) -> FlakeRecipe {
+    /// Flakes whose metal has the color of the base's wide lobes, which is theirs seen from afar.
+    fn recipe(&self, base: &CarPaint) -> FlakeRecipe {
+        let wide = base.lobes.iter().filter(|lobe| lobe.alpha >= METAL_ALPHA);
+        let color = wide.fold([0.0; 3], |sum, lobe| {
+            std::array::from_fn(|c| sum[c] + lobe.weight[c])
+        });
+        // A reflectance is at most 1; how bright the flakes are, their share says.
+        let largest = color.into_iter().fold(0.0, f64::max);
         FlakeRecipe {
             per_mm2: self.per_mm2,
             radius_um: self.radius_um,
             tilt: self.tilt,
+            tint: color.map(|c| c / largest),
+            tint_spread: self.tint_spread,
             seed: self.seed,
             ..FlakeRecipe::default()
         }

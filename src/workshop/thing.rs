@@ -137,6 +137,13 @@ pub fn open(
         let bytes = read(&path, &options.limits)?;
         let blend = Blend::from_bytes(&bytes, &options.limits)
             .map_err(|e| WorkshopError::input(name, e))?;
+        if let Some(clusters) = options.clusters {
+            let problem = format!(
+                "{name} is a blend, its clusters correspond already: blend its paints again with --clusters {clusters}, \
+                 or leave the option out"
+            );
+            return Err(WorkshopError::usage("--clusters", problem));
+        }
         return Ok(Thing::Blend(Box::new(blend)));
     }
     if PaintFile::recognises(&head) {
@@ -157,7 +164,7 @@ impl Thing {
     /// [`WorkshopError`] for weights that the blend refuses.
     pub fn realise(
         self,
-        weights: impl FnOnce(&Blend) -> Result<Option<RealisationWeights>, WorkshopError>,
+        weights: Option<&RealisationWeights>,
     ) -> Result<Realised<CarPaint>, WorkshopError> {
         match self {
             Self::Paint(file) => Ok(Realised {
@@ -165,10 +172,11 @@ impl Thing {
                 clamps: Vec::new(),
                 weight_sums: [1.0; 3],
             }),
-            Self::Blend(blend) => match weights(&blend)? {
-                Some(weights) => Ok(blend.realise(&weights)?),
-                None => Err(WorkshopError::internal("a blend without weights")),
-            },
+            Self::Blend(blend) => {
+                let weights = weights
+                    .ok_or_else(|| WorkshopError::usage("weights", "a blend needs weights"))?;
+                Ok(blend.realise(weights)?)
+            }
         }
     }
 }

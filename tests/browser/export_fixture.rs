@@ -1,7 +1,9 @@
 //! Writes bundles, GLBs and what they must shade to: the input of the browser tests.
 //!
 //! `cargo run --example export_fixture -- DIR`. The paints are made up: a silver under a coat with skewed, colored flakes
-//! that show every branch of the shader, the same with a hue that travels, and a solid without coat.
+//! that show every branch of the shader, the same with a hue that travels, and a solid without coat; and blends of them.
+
+mod blend_fixture;
 
 use std::path::Path;
 
@@ -24,14 +26,7 @@ fn main() -> Result<(), Anything> {
         ("travel", travelling()?),
         ("solid", solid()?),
     ] {
-        let about = About {
-            name: name.into(),
-            provenance: Provenance {
-                source: "made up".into(),
-                ..Provenance::default()
-            },
-            report: json!({"warnings": []}),
-        };
+        let about = about(name);
         for (suffix, precision) in [
             ("f32", Precision::F32),
             ("f16", Precision::F16),
@@ -57,14 +52,30 @@ fn main() -> Result<(), Anything> {
         )?;
         std::fs::write(
             folder.join(format!("{name}_expected.json")),
-            serde_json::to_vec(&expected(&paint))?,
+            serde_json::to_vec(&expected(&paint, tile_of(&paint)))?,
         )?;
     }
-    Ok(())
+    blend_fixture::write(folder)
 }
 
-/// What the shader must find.
-fn expected(paint: &CarPaint) -> Value {
+fn about(name: &str) -> About {
+    About {
+        name: name.into(),
+        provenance: Provenance {
+            source: "made up".into(),
+            ..Provenance::default()
+        },
+        report: json!({"warnings": []}),
+    }
+}
+
+fn tile_of(paint: &CarPaint) -> Option<&'static RandomTexture> {
+    let flakes = paint.flakes.as_ref()?;
+    Some(RandomTexture::of(&flakes.texture))
+}
+
+/// What the shader must find, with flakes scattered as this tile says.
+fn expected(paint: &CarPaint, tile: Option<&RandomTexture>) -> Value {
     let reflectance = Reflectance::new(paint);
     let mut random = Random(7);
     let pairs: Vec<Value> = (0..50)
@@ -80,13 +91,13 @@ fn expected(paint: &CarPaint) -> Value {
                 reflectance.evaluate(wi, wo, Chi::Table),
                 reflectance.mirror(wo),
             );
-            let mean = reflectance
-                .terms(wi, wo, Chi::Table)
-                .map_or([0.0; 3], |terms| terms.flakes);
-            json!({"wi": wi, "wo": wo, "f": f, "mirror": mirror, "flakes": mean})
+            let terms = reflectance.terms(wi, wo, Chi::Table);
+            let base = terms.map_or([0.0; 3], |terms| terms.base);
+            let mean = terms.map_or([0.0; 3], |terms| terms.flakes);
+            json!({"wi": wi, "wo": wo, "f": f, "mirror": mirror, "base": base, "flakes": mean})
         })
         .collect();
-    let Some(flakes) = &paint.flakes else {
+    let (Some(flakes), Some(tile)) = (&paint.flakes, tile) else {
         return json!({"pairs": pairs, "slices": [], "texels": []});
     };
     let columns = flakes.theta_d.len();
@@ -99,10 +110,7 @@ fn expected(paint: &CarPaint) -> Value {
             json!({"angles": angles, "mean": flakes.slice_at(k).mean()})
         })
         .collect();
-    let (sampler, tile) = (
-        FlakeSampler::new(flakes),
-        RandomTexture::of(&flakes.texture),
-    );
+    let sampler = FlakeSampler::new(flakes);
     let texels: Vec<Value> = (0..400)
         .map(|_| {
             let (x, y) = (random.within(-900, 900), random.within(-900, 900));

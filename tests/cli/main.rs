@@ -1,5 +1,7 @@
 //! The real binary, as scripts call it.
 
+mod bundle;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -551,4 +553,183 @@ fn every_command_teaches_itself() {
             "{command}: {help}"
         );
     }
+}
+
+#[test]
+fn a_blend_names_the_paints_it_speaks_of_whatever_their_order() {
+    let desk = Desk::new();
+    for pair in [["blue", "bmw339"], ["bmw339", "blue"]] {
+        let words = ["blend", pair[0], pair[1], "--profile", "draft", "--json"];
+        let told = json(
+            &desk
+                .ok(&[&words[..], &["--out", "b.blend"]].concat())
+                .stdout,
+        );
+        let shown = json(&desk.ok(&["show", "b.blend", "--json"]).stdout);
+        for correspondence in [&told["correspondence"], &shown["correspondence"]] {
+            assert_eq!(
+                correspondence["without_flakes"][0]["name"], "blue",
+                "{correspondence}"
+            );
+            let place = correspondence["without_flakes"][0]["place"].as_u64();
+            assert_eq!(
+                place.and_then(|k| usize::try_from(k).ok()).map(|k| pair[k]),
+                Some("blue")
+            );
+        }
+    }
+}
+
+#[test]
+fn a_realised_paint_remembers_its_weights_and_that_its_flakes_were_simulated() {
+    let desk = Desk::with_blend();
+    let own = ["--base", "3,-2", "--flake-lightness", "0.5,0.5"];
+    let color = ["--flake-color", "1,0", "--out", "r.paint"];
+    desk.ok(&[&["realise", "b.blend"][..], &own, &color].concat());
+    let about = json(&desk.ok(&["show", "r.paint", "--json"]).stdout);
+    let provenance = &about["provenance"];
+    assert_eq!(provenance["simulated_flakes"], true);
+    let realisation = &provenance["realisation"];
+    assert_eq!(
+        (&realisation["base"], &realisation["flake_color"]),
+        (
+            &serde_json::json!([3.0, -2.0]),
+            &serde_json::json!([1.0, 0.0])
+        )
+    );
+    let clamps = about["clamps"].as_array().expect("a list");
+    assert!(!clamps.is_empty() && about["clamps"] == realisation["clamps"]);
+    let text = String::from_utf8(desk.ok(&["show", "r.paint"]).stdout).expect("text");
+    assert!(text.starts_with("clamps:\n"), "{text}");
+
+    // Blended again its clusters are reduced, which the blend keeps.
+    let again = ["blend", "sample:white", "r.paint", "--clusters", "5"];
+    desk.ok(&[&again[..], &["--out", "again.blend"]].concat());
+    let shown = json(&desk.ok(&["show", "again.blend", "--json"]).stdout);
+    let reduced = &shown["correspondence"]["reduced"][0];
+    assert_eq!((&reduced["place"], &reduced["to"]), (&1.into(), &5.into()));
+    assert!(reduced["from"].as_u64() > Some(5), "{reduced}");
+    assert_eq!(shown["paints"][1]["simulated_flakes"], true);
+}
+
+#[test]
+fn options_that_would_be_ignored_are_refused_and_defaults_are_defaults() {
+    let desk = Desk::with_blend();
+    let preview = ["preview", "b.blend", "--weights", "1,0", "--clusters", "7"];
+    let said = desk.refused(2, &[&preview[..], &["--out", "p.png"]].concat());
+    assert!(said.contains("--clusters 7"), "{said}");
+    let said = desk.refused(2, &["blend", "no-such-file", "--out", "c.blend"]);
+    assert!(said.contains("1 paints given"), "counted first: {said}");
+    for threads in ["0", ""] {
+        let list = Command::new(env!("CARGO_BIN_EXE_carpaint"))
+            .env("RAYON_NUM_THREADS", threads)
+            .args(["samples", "list"])
+            .output();
+        assert!(list.expect("the binary starts").status.success());
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn out_replaces_files_and_writes_through_everything_else() {
+    use std::io::Read as _;
+    use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _, symlink};
+    let desk = Desk::new();
+    let export = |out: &str| desk.ok(&["samples", "export", "white", "--out", out]);
+    export("new.paint");
+    let white = desk.read("new.paint");
+
+    let mode = |name: &str| {
+        let about = fs::metadata(desk.path(name)).expect("is there");
+        about.permissions().mode() & 0o777
+    };
+    fs::write(desk.path("plain"), b"").expect("written");
+    assert_eq!(mode("new.paint"), mode("plain"), "the umask decides");
+    fs::write(desk.path("old.paint"), b"old").expect("written");
+    fs::set_permissions(desk.path("old.paint"), fs::Permissions::from_mode(0o640)).expect("is set");
+    export("old.paint");
+    assert_eq!(
+        (mode("old.paint"), desk.read("old.paint")),
+        (0o640, white.clone())
+    );
+
+    fs::create_dir(desk.path("there")).expect("made");
+    symlink("there/real.paint", desk.path("link.paint")).expect("linked");
+    for _ in 0..2 {
+        export("link.paint");
+        assert!(desk.path("link.paint").is_symlink());
+        assert_eq!(desk.read("there/real.paint"), white);
+    }
+
+    let pipe = desk.path("pipe");
+    assert!(
+        Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .expect("runs")
+            .success()
+    );
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || {
+            let mut bytes = Vec::new();
+            fs::File::open(pipe)
+                .and_then(|mut file| file.read_to_end(&mut bytes))
+                .map(|_| bytes)
+        }
+    });
+    export("pipe");
+    assert_eq!(reader.join().expect("reads").expect("reads"), white);
+    let still = fs::symlink_metadata(&pipe).expect("is there");
+    assert!(still.file_type().is_fifo(), "a pipe stays a pipe");
+}
+
+#[test]
+fn a_reader_who_has_heard_enough_is_no_error() {
+    use std::process::Stdio;
+    let desk = Desk::with_blend();
+    for words in [
+        &["show", "b.blend"][..],
+        &["samples", "list"],
+        &["samples", "list", "--json"],
+    ] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_carpaint"))
+            .current_dir(desk.folder.path())
+            .args(words)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("starts");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("ends");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            output.status.success() && said.is_empty(),
+            "{words:?}: {said}"
+        );
+    }
+}
+
+#[test]
+fn the_selftest_says_what_it_found_and_passes_on_samples() {
+    let desk = Desk::new();
+    let output = desk.ok(&["selftest", "sample:white", "--profile", "draft", "--json"]);
+    let report = json(&output.stdout);
+    assert_eq!(report["passed"], true);
+    let checks = report["checks"].as_array().expect("a list");
+    assert!(checks.len() >= 14, "{report}");
+    for check in checks {
+        let (found, limit) = (check["found"].as_f64(), check["limit"].as_f64());
+        assert!(
+            found.expect("a number") <= limit.expect("a number"),
+            "{check}"
+        );
+    }
+    let table = desk
+        .ok(&["selftest", "sample:white", "--profile", "draft"])
+        .stdout;
+    let table = String::from_utf8(table).expect("text");
+    assert_eq!(table.lines().count(), checks.len() + 1, "{table}");
+    assert!(!table.contains("FAILED"));
+    desk.refused(3, &["selftest", "no_such_paint"]);
 }

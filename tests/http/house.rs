@@ -10,7 +10,7 @@ use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
     App, Asked, Estimate, Fault, Format, IngestOrder, Picked, Picture, PictureFormat, Progress,
-    ServiceConfig, Target, Thing, View, WorkError, Works, open, serve,
+    ServiceConfig, Target, Thing, View, WorkError, Works, Workshop, open, serve,
 };
 use carpaint::workshop::EstimatedError;
 use serde_json::{Value, json};
@@ -79,6 +79,7 @@ impl Works for Pretend {
             paint,
             clustering: None,
             residuals: None,
+            readings: None,
             warnings: Vec::new(),
         })
     }
@@ -124,17 +125,29 @@ impl Works for Pretend {
         Ok(format!("{format:?} {diffuse:?}").into_bytes())
     }
 
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError> {
+        carpaint::service::Workshop::new(carpaint::paint::Limits::default()).bundle(blend, profile)
+    }
+
     fn preview(
         &self,
         thing: &Thing,
         weights: Option<&RealisationWeights>,
         view: &View,
         format: PictureFormat,
+        progress: Progress<'_>,
     ) -> Result<Picture, WorkError> {
         let paint = self.realise(thing, weights, Format::Json, &Profile::default())?;
+        // A tall picture takes its time.
+        let begun = Instant::now();
+        while view.size[1] == 4000 && begun.elapsed() < Duration::from_secs(4) {
+            progress(0.5);
+            std::thread::sleep(Duration::from_millis(5));
+        }
         Ok(Picture {
             bytes: [format!("{format:?} {view:?} ").into_bytes(), paint].concat(),
             accuracy: "sampling-mean-de2000=0.5".to_owned(),
+            report: json!({ "clamps": [], "plan": "whatever" }),
         })
     }
 
@@ -191,8 +204,19 @@ impl House {
         Self::with(ServiceConfig::new(data.to_owned())).await
     }
 
+    /// With the real workshop behind it.
+    pub async fn real(data: &Path) -> Self {
+        let config = ServiceConfig::new(data.to_owned());
+        let works = Arc::new(Workshop::new(config.limits));
+        Self::of(config, works).await
+    }
+
     pub async fn with(config: ServiceConfig) -> Self {
-        let app: App = open(config, Arc::new(Pretend)).await.expect("opens");
+        Self::of(config, Arc::new(Pretend)).await
+    }
+
+    async fn of(config: ServiceConfig, works: Arc<dyn Works>) -> Self {
+        let app: App = open(config, works).await.expect("opens");
         app.set_ready();
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("an address");

@@ -1,8 +1,10 @@
 //! The service end to end, over real connections on a port of its own.
 
+mod bundle;
 mod client;
 mod house;
 mod kill;
+mod real;
 
 use std::time::{Duration, Instant};
 
@@ -856,7 +858,7 @@ async fn answers_carry_what_caches_need() {
         ),
         (
             format!("/v1/paints/{a}/measurement"),
-            "immutable",
+            "private, no-cache",
             "application/octet-stream",
         ),
         (format!("/v1/paints/{a}"), "no-cache", "application/json"),
@@ -1238,6 +1240,180 @@ async fn an_upload_that_breaks_off_leaves_nothing() {
         (0, 0)
     );
     assert_eq!(house.get("/v1/paints").await.json()["paints"], json!([]));
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_picture_has_its_report_beside_it_and_a_whole_scene_is_posted() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let (a, b) = (house.paint("silver").await, house.paint("blue").await);
+    let blend = house.blend(&[&a, &b]).await;
+    let query = "weights=0.25,0.75&size=32x16&spp=3&light=0,1,1";
+    let picture = house
+        .get(&format!("/v1/blends/{blend}/preview.png?{query}"))
+        .await;
+    let link = picture.header("link").expect("a link").to_owned();
+    let report = link
+        .split_once('>')
+        .map(|(address, _)| &address[1..])
+        .expect("an address");
+    assert!(report.ends_with(&format!("preview.json?{query}")), "{link}");
+    let report = house.get(report).await;
+    assert_eq!(report.json()["clamps"], json!([]));
+    assert_eq!(house.count("carpaint_previews_rendered_total").await, 1.0);
+
+    let scene = json!({
+        "blend": blend, "weights": [0.25, 0.75], "size": [32, 16], "samples_per_pixel": 3,
+        "lights": [{"towards": [0, 1, 1]}],
+    });
+    let posted = house.post_json("/v1/previews", &scene.to_string()).await;
+    assert_eq!((posted.status, &posted.body), (200, &picture.body));
+    assert_eq!(house.count("carpaint_previews_rendered_total").await, 1.0);
+    let refusals = [
+        (json!({"paint": a, "blend": blend}), "/paint"),
+        (json!({}), "/paint"),
+        (json!({"paint": "nobody"}), "/paint"),
+        (json!({"paint": a, "weights": [1, 0]}), "/weights"),
+        (json!({"blend": blend}), "/weights"),
+        (json!({"blend": blend, "weights": [1]}), "/weights"),
+        (
+            json!({"paint": a, "samples_per_pixel": 0}),
+            "/samples_per_pixel",
+        ),
+        (json!({"paint": a, "size": [0, 9]}), "/size"),
+        (
+            json!({"paint": a, "lights": [{"towards": [0, 0, 0]}]}),
+            "/light",
+        ),
+        (json!({"paint": a, "format": "gif"}), "/format"),
+        (json!({"paint": a, "profile": "best"}), "/profile"),
+    ];
+    for (scene, pointer) in refusals {
+        let answer = house.post_json("/v1/previews", &scene.to_string()).await;
+        let problem = answer.problem(422, "invalid-value");
+        assert_eq!(problem["pointer"], pointer, "{scene}: {problem}");
+        assert!(problem["accepted"].is_string(), "{scene}: {problem}");
+    }
+    let problem = house
+        .get(&format!("/v1/paints/{a}/preview.gif"))
+        .await
+        .problem(404, "unknown-address");
+    assert_eq!(problem["accepted"], "png, exr, json");
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_picture_that_nobody_waits_for_is_called_off() {
+    use tokio::io::AsyncWriteExt;
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let paint = house.paint("silver").await;
+    let slow = format!("/v1/paints/{paint}/preview.png?size=8x4000&spp=1");
+    {
+        let mut stream = tokio::net::TcpStream::connect(house.address)
+            .await
+            .expect("connects");
+        let request = format!("GET {slow} HTTP/1.1\r\nHost: x\r\n\r\n");
+        stream.write_all(request.as_bytes()).await.expect("sends");
+        tokio::time::sleep(Duration::from_millis(300)).await;
+    }
+    tokio::time::sleep(Duration::from_millis(5000)).await;
+    assert_eq!(house.count("carpaint_previews_rendered_total").await, 0.0);
+    assert_eq!(house.get(&slow).await.status, 200, "who waits gets it");
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_idempotency_key_is_one_request() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let keyed = |body: &'static [u8], key: &'static str| {
+        let house = &house;
+        async move {
+            let headers = [("Prefer", "wait=30"), ("Idempotency-Key", key)];
+            house.ask("POST", "/v1/paints", &headers, body).await
+        }
+    };
+    let first = keyed(b"silver", "k-1").await;
+    assert_eq!(first.status, 201);
+    let again = keyed(b"silver", "k-1").await;
+    assert_eq!((again.status, again.json()), (200, first.json()));
+    let problem = keyed(b"blue", "k-1")
+        .await
+        .problem(422, "idempotency-key-used");
+    assert_eq!(
+        (&problem["in"], &problem["pointer"]),
+        (&json!("header"), &json!("/Idempotency-Key"))
+    );
+    assert_eq!(walk(&data.path().join("blobs")), 2, "nothing is kept of it");
+    assert_eq!(keyed(b"blue", "k-2").await.status, 201);
+    keyed(b"blue", "").await.problem(400, "invalid-parameter");
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_private_paint_is_left_out_of_lists() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let (a, b) = (house.paint("silver").await, house.paint("blue").await);
+    let address = format!("/v1/paints/{a}");
+    let published = house.get(&address).await;
+    assert_eq!(published.json()["visibility"], "published");
+    let change = |body: &'static str| {
+        let (house, address) = (&house, &address);
+        async move {
+            let headers = [("Content-Type", "application/json")];
+            house.ask("PATCH", address, &headers, body.as_bytes()).await
+        }
+    };
+    let private = change(r#"{"visibility": "private"}"#).await;
+    assert_eq!(
+        (private.status, &private.json()["visibility"]),
+        (200, &json!("private"))
+    );
+    assert_ne!(private.etag(), published.etag());
+    let ids = |list: serde_json::Value| -> Vec<String> {
+        let paints = list["paints"].as_array().expect("a list").clone();
+        let id = |paint: &serde_json::Value| paint["id"].as_str().expect("an id").to_owned();
+        paints.iter().map(id).collect()
+    };
+    assert_eq!(ids(house.get("/v1/paints").await.json()), [b]);
+    let hidden = house.get("/v1/paints?visibility=private").await.json();
+    assert_eq!(ids(hidden), [a.clone()]);
+    let problem = change(r#"{"visibility": "secret"}"#)
+        .await
+        .problem(422, "invalid-value");
+    assert_eq!(
+        (&problem["pointer"], &problem["accepted"]),
+        (&json!("/visibility"), &json!("published or private"))
+    );
+    assert_eq!(
+        change(r#"{"visibility": "published"}"#).await.json(),
+        published.json()
+    );
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_body_that_never_ends_is_not_waited_for() {
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    let data = folder();
+    let config = ServiceConfig {
+        body_time: Duration::from_millis(300),
+        ..ServiceConfig::new(data.path().to_owned())
+    };
+    let house = House::with(config).await;
+    let mut stream = tokio::net::TcpStream::connect(house.address)
+        .await
+        .expect("connects");
+    let head = "POST /v1/blends HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: 50\r\n\r\n{";
+    stream.write_all(head.as_bytes()).await.expect("sends");
+    let mut answer = Vec::new();
+    let read = tokio::time::timeout(Duration::from_secs(5), stream.read_to_end(&mut answer));
+    let _ = read.await.expect("is answered in time");
+    let answer = String::from_utf8_lossy(&answer);
+    assert!(answer.starts_with("HTTP/1.1 408"), "{answer}");
     house.close().await;
 }
 

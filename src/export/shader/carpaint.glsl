@@ -10,6 +10,9 @@
 //
 // A texel of the paint is `texel_um` micrometres wide (material.json). Numbers are fetched, never filtered: upload every
 // texture with nearest filtering, without mipmaps, without flipping, premultiplication or color conversion.
+//
+// For the bundle of a whole blend define CARPAINT_PAINTS as its number of paints (2 to 5) before this file: boxes and color
+// table are then mixed by carpaint_weights, and carpaint_slice_means must hold the means of those weights.
 
 precision highp float;
 precision highp int;
@@ -36,6 +39,9 @@ uniform ivec4 carpaint_grid;                                // angles: color tab
 uniform vec2 carpaint_persistence_deg;                      // along theta_h and theta_d
 uniform vec3 carpaint_corner_scale;                         // 1 unless corners are 8-bit
 uniform vec3 carpaint_corner_offset;                        // 0 unless corners are 8-bit
+#ifdef CARPAINT_PAINTS
+uniform vec3 carpaint_weights[CARPAINT_PAINTS]; // of base, of the flakes' lightness, of their color (times saturation)
+#endif
 
 const float CARPAINT_PI = 3.14159265358979;
 const float CARPAINT_DEGREES = 57.2957795130823;
@@ -138,11 +144,31 @@ float carpaint_mirror(vec3 wo) {
 
 // ---- base ----
 
+#ifdef CARPAINT_PAINTS
+vec3 carpaint_lab_to_rgb(vec3 lab);
+
+// Linear sRGB of the blended color table at a node: paints stand one below the other in CIELAB, where they are mixed.
+vec3 carpaint_chi_node(int theta_h, int theta_d) {
+    vec3 lab = vec3(0.0);
+    for (int m = 0; m < CARPAINT_PAINTS; ++m) {
+        ivec2 at = ivec2(theta_d, theta_h + m * carpaint_grid.x);
+        lab += carpaint_weights[m].x * texelFetch(carpaint_color_table, at, 0).rgb;
+    }
+    return carpaint_lab_to_rgb(clamp(lab, -2000.0, 2000.0));
+}
+#endif
+
 // The color table at an angle pair inside the coat.
 vec3 carpaint_chi(CarpaintHalf h) {
     CarpaintBracket row = carpaint_bracket(0, carpaint_grid.x, h.theta_h_deg);
     CarpaintBracket column = carpaint_bracket(1, carpaint_grid.y, h.theta_d_deg);
+#ifdef CARPAINT_PAINTS
+    vec3 low = mix(carpaint_chi_node(row.low, column.low), carpaint_chi_node(row.low, column.high), column.fraction);
+    vec3 high = mix(carpaint_chi_node(row.high, column.low), carpaint_chi_node(row.high, column.high), column.fraction);
+    return mix(low, high, row.fraction);
+#else
     return carpaint_bilinear(carpaint_color_table, row, column);
+#endif
 }
 
 // Diffuse and lobes times the color table, for directions inside the coat.
@@ -255,9 +281,25 @@ vec3 carpaint_lab_to_rgb(vec3 lab) {
 
 // Color of one cluster's box at a place in it, 1/sr.
 vec3 carpaint_box(int cluster, vec3 place) {
+#ifdef CARPAINT_PAINTS
+    // Weighted sums of the paints' corners; those that changed places by extrapolation are put in order.
+    ivec2 size = textureSize(carpaint_corners_lower, 0);
+    ivec2 at = carpaint_at(cluster, size.x);
+    vec3 first = vec3(0.0);
+    vec3 second = vec3(0.0);
+    for (int m = 0; m < CARPAINT_PAINTS; ++m) {
+        vec3 weight = carpaint_weights[m].yzz;
+        first += weight * (texelFetch(carpaint_corners_lower, at, 0).rgb * carpaint_corner_scale + carpaint_corner_offset);
+        second += weight * (texelFetch(carpaint_corners_upper, at, 0).rgb * carpaint_corner_scale + carpaint_corner_offset);
+        at.y += size.y / CARPAINT_PAINTS;
+    }
+    vec3 lower = clamp(min(first, second), -2000.0, 2000.0);
+    vec3 upper = clamp(max(first, second), -2000.0, 2000.0);
+#else
     ivec2 at = carpaint_at(cluster, textureSize(carpaint_corners_lower, 0).x);
     vec3 lower = texelFetch(carpaint_corners_lower, at, 0).rgb * carpaint_corner_scale + carpaint_corner_offset;
     vec3 upper = texelFetch(carpaint_corners_upper, at, 0).rgb * carpaint_corner_scale + carpaint_corner_offset;
+#endif
     return carpaint_lab_to_rgb(lower + (upper - lower) * place) / CARPAINT_PI;
 }
 

@@ -6,31 +6,55 @@
 //   const paint = await readPaint(await (await fetch("paint.zip")).arrayBuffer());
 //   mesh.material = carpaintMaterial(THREE, paint);
 //
+// Of the bundle of a whole blend it is the paint at equal weights; others are set at any time:
+//
+//   mesh.material.userData.setWeights({ weights: [0.3, 0.7] });
+//
 // Shades one directional light and a made-up sky. Flakes are placed by uv: `uvMeters` says how many meters of paint one
 // unit of uv spans. For more lights call carpaint_shade_area once for each.
 
-import { SAMPLERS, uniformValues } from "./carpaint.js";
+import { SAMPLERS, blendAt, uniformValues } from "./carpaint.js";
 
 export function carpaintMaterial(THREE, paint, { uvMeters = [0.06, 0.03], lightDirection = [0.4, 0.6, 0.7] } = {}) {
+  const { paints } = paint.material;
+  const first = paints ? blendAt(paint, { weights: paints.map(() => 1 / paints.length) }) : paint;
   const uniforms = {
     light_direction: { value: new THREE.Vector3(...lightDirection).normalize() },
     light_irradiance: { value: Math.PI },
     sky: { value: 0.35 },
-    texels_per_uv: { value: new THREE.Vector2(...uvMeters.map((m) => (m * 1e6) / (paint.material.flakes?.texel_um ?? 1e6))) },
+    texels_per_uv: { value: new THREE.Vector2() },
   };
   const vectors = { 2: THREE.Vector2, 3: THREE.Vector3, 4: THREE.Vector4 };
   const wrap = (value) => {
     if (!Array.isArray(value)) return value;
     return Array.isArray(value[0]) ? value.map(wrap) : new vectors[value.length](...value);
   };
-  for (const [name, value] of Object.entries(uniformValues(paint.material))) uniforms[name] = { value: wrap(value) };
+  const set = ({ material }) => {
+    for (const [name, value] of Object.entries(uniformValues(material))) {
+      uniforms[name] ??= {};
+      uniforms[name].value = wrap(value);
+    }
+    const texel_um = material.flakes?.tile_texel_um ?? material.flakes?.texel_um ?? 1e6;
+    uniforms.texels_per_uv.value.set(...uvMeters.map((m) => (m * 1e6) / texel_um));
+  };
+  set(first);
   const nothing = { width: 1, height: 1, components: 4, type: "float", data: new Float32Array(4) };
-  for (const name of SAMPLERS) uniforms[`carpaint_${name}`] = { value: dataTexture(THREE, paint.textures[name] ?? nothing) };
-  return new THREE.ShaderMaterial({
+  for (const name of SAMPLERS) uniforms[`carpaint_${name}`] = { value: dataTexture(THREE, first.textures[name] ?? nothing) };
+  const material = new THREE.ShaderMaterial({
     uniforms,
     vertexShader: VERTEX,
     fragmentShader: paint.shader + FRAGMENT,
   });
+  if (paints) {
+    material.userData.setWeights = (weights) => {
+      const mixed = blendAt(paint, weights);
+      set(mixed);
+      if (!mixed.textures.slice_means) return;
+      uniforms.carpaint_slice_means.value.dispose();
+      uniforms.carpaint_slice_means.value = dataTexture(THREE, mixed.textures.slice_means);
+    };
+  }
+  return material;
 }
 
 // Three components are padded to four: WebGL has no such texture any more in three.js.

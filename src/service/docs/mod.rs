@@ -12,8 +12,8 @@ use super::answer::{Answer, Keep};
 use super::extract::Address;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::{
-    accuracy, blends, documents, estimates, jobs, operations, paints, previews, profile,
-    realisations, runner, works,
+    accuracy, blend_bundles, blends, documents, estimates, jobs, operations, paints, previews,
+    profile, realisations, runner, visibility, works,
 };
 
 /// Only what this service itself serves.
@@ -29,10 +29,10 @@ const POLICY: &str =
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     paths(
-        paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete,
-        blends::create, blends::show,
+        paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete, visibility::change,
+        blends::create, blends::show, blend_bundles::bundle,
         realisations::of_blend, realisations::of_paint,
-        previews::of_blend, previews::of_paint,
+        previews::of_blend, previews::of_paint, previews::create,
         estimates::create, accuracy::show,
         jobs::show, jobs::events, jobs::cancel,
         operations::healthz, operations::readyz, operations::metrics,
@@ -40,7 +40,7 @@ const POLICY: &str =
     components(schemas(
         documents::PaintDocument, documents::PaintList, documents::PaintSummary, documents::BlendDocument,
         blends::BlendOrder, profile::ProfileDocument, profile::KnobsDocument, estimates::EstimateOrder, estimates::EstimateDocument, runner::JobDocument, operations::Health, ProblemDocument,
-        works::Layout, works::ThetaH, works::Format, works::PictureFormat, works::Scene,
+        works::Layout, works::ThetaH, works::Format, previews::PreviewFormat, previews::PreviewOrder, works::Light, works::Scene,
     )),
     tags(
         (name = "paints", description = "Uploads become paints"),
@@ -89,6 +89,7 @@ fn methods(item: &PathItem) -> String {
     let known = [
         (&item.get, "GET, HEAD"),
         (&item.post, "POST"),
+        (&item.patch, "PATCH"),
         (&item.delete, "DELETE"),
     ];
     known

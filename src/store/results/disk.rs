@@ -17,11 +17,15 @@ use crate::store::whole_file::{Durability, appear};
 
 const HASH_BYTES: usize = 32;
 
+/// Where results are written before they appear.
+const INCOMING: &str = "incoming";
+
 #[derive(Debug)]
 pub(super) struct ResultFolder {
     folder: PathBuf,
     limit: u64,
     held: AtomicU64,
+    sweeping: tokio::sync::Mutex<()>,
 }
 
 struct Entry {
@@ -33,7 +37,11 @@ struct Entry {
 impl ResultFolder {
     pub(super) fn open(folder: &Path, limit: u64) -> Result<Self, StoreError> {
         let open = || -> io::Result<u64> {
-            fs::create_dir_all(folder)?;
+            let incoming = folder.join(INCOMING);
+            if incoming.is_dir() {
+                fs::remove_dir_all(&incoming)?;
+            }
+            fs::create_dir_all(incoming)?;
             Ok(entries(folder)?.iter().map(|entry| entry.bytes).sum())
         };
         let held = open().map_err(StoreError::io(format!(
@@ -44,6 +52,7 @@ impl ResultFolder {
             folder: folder.to_owned(),
             limit,
             held: AtomicU64::new(held),
+            sweeping: tokio::sync::Mutex::default(),
         })
     }
 
@@ -62,7 +71,7 @@ impl ResultFolder {
             let mut bytes = Vec::new();
             file.read_to_end(&mut bytes)?;
             if Hash::of(&bytes).as_bytes() != &hash {
-                fs::remove_file(&place)?;
+                missing_is_gone(fs::remove_file(&place))?;
                 return Ok(None);
             }
             // What was used last goes last; not every file system minds.
@@ -88,7 +97,7 @@ impl ResultFolder {
         if length > self.limit / 4 {
             return;
         }
-        let (folder, place) = (self.folder.clone(), self.place(key));
+        let (folder, place) = (self.folder.join(INCOMING), self.place(key));
         let written = spawn_blocking(move || -> io::Result<()> {
             let mut file = NamedTempFile::new_in(folder)?;
             file.write_all(result.hash.as_bytes())?;
@@ -108,6 +117,10 @@ impl ResultFolder {
 
     /// Drops what was not used for longest, until a tenth of the space is free.
     async fn sweep(&self) {
+        // One at a time; who comes meanwhile finds the room made.
+        let Ok(_sweeping) = self.sweeping.try_lock() else {
+            return;
+        };
         let (folder, goal) = (self.folder.clone(), self.limit / 10 * 9);
         let swept = spawn_blocking(move || -> io::Result<u64> {
             let mut entries = entries(&folder)?;
@@ -117,7 +130,7 @@ impl ResultFolder {
                 if held <= goal {
                     break;
                 }
-                fs::remove_file(entry.path)?;
+                missing_is_gone(fs::remove_file(entry.path))?;
                 held -= entry.bytes;
             }
             Ok(held)
@@ -130,11 +143,22 @@ impl ResultFolder {
     }
 }
 
-/// All files of the folder, left-over temporary ones too.
+/// A file that somebody else removed is gone as well.
+fn missing_is_gone(removed: io::Result<()>) -> io::Result<()> {
+    match removed {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        removed => removed,
+    }
+}
+
+/// All results in the folder, none of those being written.
 fn entries(folder: &Path) -> io::Result<Vec<Entry>> {
     let mut all = Vec::new();
     for item in fs::read_dir(folder)? {
         let item = item?;
+        if item.file_name() == INCOMING {
+            continue;
+        }
         if item.file_type()?.is_dir() {
             all.extend(entries(&item.path())?);
         } else if let Ok(metadata) = item.metadata() {

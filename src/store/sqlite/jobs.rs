@@ -96,6 +96,20 @@ impl JobBook for SqliteCatalogue {
         })
     }
 
+    fn forget_ended_jobs(&self, keep: u32) -> Task<'_, ()> {
+        Box::pin(async move {
+            sqlx::query(
+                "DELETE FROM jobs WHERE state IN ('done', 'failed', 'cancelled') AND seq <= (
+                     SELECT seq FROM jobs WHERE state IN ('done', 'failed', 'cancelled')
+                     ORDER BY seq DESC LIMIT 1 OFFSET ?)",
+            )
+            .bind(i64::from(keep))
+            .execute(&self.write)
+            .await?;
+            Ok(())
+        })
+    }
+
     fn end_job<'a>(
         &'a self,
         id: &'a str,

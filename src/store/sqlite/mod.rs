@@ -65,6 +65,32 @@ impl Catalogue for SqliteCatalogue {
         })
     }
 
+    fn tie_key<'a>(&'a self, key: &'a str, subject: &'a str, keep: u32) -> Task<'a, String> {
+        Box::pin(async move {
+            let mut transaction = self.write.begin().await?;
+            let tied = sqlx::query("INSERT INTO request_keys (key, subject) VALUES (?, ?) ON CONFLICT (key) DO NOTHING")
+                .bind(key)
+                .bind(subject)
+                .execute(&mut *transaction)
+                .await?;
+            if tied.rows_affected() == 1 {
+                sqlx::query(
+                    "DELETE FROM request_keys WHERE seq <= (SELECT max(seq) FROM request_keys) - ?",
+                )
+                .bind(i64::from(keep))
+                .execute(&mut *transaction)
+                .await?;
+            }
+            let (subject,): (String,) =
+                sqlx::query_as("SELECT subject FROM request_keys WHERE key = ?")
+                    .bind(key)
+                    .fetch_one(&mut *transaction)
+                    .await?;
+            transaction.commit().await?;
+            Ok(subject)
+        })
+    }
+
     fn names_blob(&self, blob: Hash) -> Task<'_, bool> {
         Box::pin(async move {
             let (named,): (bool,) = sqlx::query_as(

@@ -5,10 +5,11 @@ use sqlx::sqlite::SqliteRow;
 
 use super::{SqliteCatalogue, hash};
 use crate::store::blobs::Task;
-use crate::store::{PaintPage, PaintRecord, Paints, StoreError};
+use crate::store::{PaintPage, PaintRecord, Paints, StoreError, Visibility};
 
 fn record(row: &SqliteRow) -> Result<PaintRecord, StoreError> {
     let measurement: Option<String> = row.try_get("measurement")?;
+    let visibility: String = row.try_get("visibility")?;
     Ok(PaintRecord {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
@@ -16,6 +17,10 @@ fn record(row: &SqliteRow) -> Result<PaintRecord, StoreError> {
         measurement: measurement.map(|text| hash(&text, "paint")).transpose()?,
         paint: hash(row.try_get("paint")?, "paint")?,
         content: hash(row.try_get("content")?, "paint")?,
+        visibility: Visibility::of_word(&visibility).ok_or_else(|| StoreError::Corrupt {
+            what: "paint",
+            detail: format!("its visibility is {visibility:?}"),
+        })?,
     })
 }
 
@@ -23,8 +28,8 @@ impl Paints for SqliteCatalogue {
     fn add_paint<'a>(&'a self, paint: &'a PaintRecord) -> Task<'a, bool> {
         Box::pin(async move {
             let added = sqlx::query(
-                "INSERT INTO paints (id, name, source, words, measurement, paint, content)
-                 VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING",
+                "INSERT INTO paints (id, name, source, words, measurement, paint, content, visibility)
+                 VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING",
             )
             .bind(&paint.id)
             .bind(&paint.name)
@@ -33,6 +38,7 @@ impl Paints for SqliteCatalogue {
             .bind(paint.measurement.map(|hash| hash.to_string()))
             .bind(paint.paint.to_string())
             .bind(paint.content.to_string())
+            .bind(paint.visibility.word())
             .execute(&self.write)
             .await?;
             Ok(added.rows_affected() == 1)
@@ -52,15 +58,17 @@ impl Paints for SqliteCatalogue {
     fn paints<'a>(
         &'a self,
         q: Option<&'a str>,
+        visibility: Visibility,
         cursor: Option<i64>,
         limit: u32,
     ) -> Task<'a, PaintPage> {
         Box::pin(async move {
             // One more than asked for tells whether there is a next page.
             let rows = sqlx::query(
-                "SELECT * FROM paints WHERE seq > ? AND (? = '' OR instr(words, ?) > 0) ORDER BY seq LIMIT ?",
+                "SELECT * FROM paints WHERE seq > ? AND visibility = ? AND (? = '' OR instr(words, ?) > 0) ORDER BY seq LIMIT ?",
             )
             .bind(cursor.unwrap_or(0))
+            .bind(visibility.word())
             .bind(q.unwrap_or("").to_lowercase())
             .bind(q.unwrap_or("").to_lowercase())
             .bind(i64::from(limit) + 1)
@@ -75,6 +83,17 @@ impl Paints for SqliteCatalogue {
                 paints: page.iter().map(record).collect::<Result<_, _>>()?,
                 next,
             })
+        })
+    }
+
+    fn show_paint<'a>(&'a self, id: &'a str, visibility: Visibility) -> Task<'a, bool> {
+        Box::pin(async move {
+            let changed = sqlx::query("UPDATE paints SET visibility = ? WHERE id = ?")
+                .bind(visibility.word())
+                .bind(id)
+                .execute(&self.write)
+                .await?;
+            Ok(changed.rows_affected() == 1)
         })
     }
 

@@ -1,9 +1,11 @@
 // Runs a bundle's shader over a list of inputs and reads the answers back as 32-bit floats.
 
-// `inputs`: lists of up to four numbers, several a fragment; `body`: GLSL that reads `given(k)` and sets `answer`.
-export async function shade(name, inputs, body, defines = "") {
-  const { readPaint, uniformValues, SAMPLERS } = await import(`/bundle/${name}/carpaint.js`);
-  const paint = await readPaint(await (await fetch(`/bundle/${name}/paint.zip`)).arrayBuffer());
+// `inputs`: lists of up to four numbers, several a fragment; `body`: GLSL that reads `given(k)` and sets `answer`;
+// `weights`: of a blend.
+export async function shade(name, inputs, body, defines = "", weights = null) {
+  const { blendAt, readPaint, uniformValues, SAMPLERS } = await import(`/bundle/${name}/carpaint.js`);
+  const read = await readPaint(await (await fetch(`/bundle/${name}/paint.zip`)).arrayBuffer());
+  const paint = weights ? blendAt(read, weights) : read;
   const gl = new OffscreenCanvas(1, 1).getContext("webgl2");
   if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("no float render targets");
   const program = link(gl, defines + paint.shader, body);

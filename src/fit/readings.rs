@@ -1,0 +1,115 @@
+//! How far a paint is from what a portable instrument read on it.
+
+use std::f64::consts::PI;
+
+use crate::color::{Illuminant, Lab, Observer, ciede2000};
+use crate::measurement::MultiAngle;
+use crate::paint::{CarPaint, Chi, ReadingError, ReadingResiduals, Reflectance};
+
+/// Compares a paint, flakes at their mean and the coat's mirror image left out, with L, a, b readings.
+///
+/// `None` where the readings hold no L, a, b, or none whose viewer is above the paint. Readings of another light or
+/// observer than D65 and 2° keep their numbers, which is marked as approximate: to convert them takes spectra.
+#[must_use]
+pub fn against_readings(paint: &CarPaint, readings: &MultiAngle) -> Option<ReadingResiduals> {
+    let column = |name: &str| readings.columns.iter().position(|own| own == name);
+    let [l, a, b] = [column("L")?, column("a")?, column("b")?];
+    let reflectance = Reflectance::new(paint);
+    let light = readings.illumination_deg.to_radians();
+    let wi = [-light.sin(), 0.0, light.cos()];
+    let rows: Vec<ReadingError> = readings
+        .rows
+        .iter()
+        .filter_map(|row| {
+            let aspecular_deg = *row.first()?;
+            let view = (readings.illumination_deg - aspecular_deg).to_radians();
+            let wo = [view.sin(), 0.0, view.cos()];
+            if wo[2] <= 0.0 || wi[2] <= 0.0 {
+                return None;
+            }
+            let read = Lab::from([*row.get(l)?, *row.get(a)?, *row.get(b)?]);
+            let factor = reflectance.evaluate(wi, wo, Chi::Table).map(|f| f * PI);
+            Some(ReadingError {
+                aspecular_deg,
+                delta_e_2000: ciede2000(Lab::from_rgb(factor), read),
+            })
+        })
+        .collect();
+    let mut sorted: Vec<f64> = rows.iter().map(|row| row.delta_e_2000).collect();
+    sorted.sort_by(f64::total_cmp);
+    let worst = *sorted.last()?;
+    let middle = sorted.len() / 2;
+    let median = if sorted.len() % 2 == 1 {
+        sorted[middle]
+    } else {
+        f64::midpoint(sorted[middle - 1], sorted[middle])
+    };
+    Some(ReadingResiduals {
+        illumination_deg: readings.illumination_deg,
+        rows,
+        median,
+        worst,
+        approximate: (readings.illuminant, readings.observer) != (Illuminant::D65, Observer::Two),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paint::{ASPECULAR_DEG, ColorTable, instrument_pairs};
+
+    fn gray(diffuse: f64) -> CarPaint {
+        CarPaint {
+            coat: None,
+            diffuse: [diffuse; 3],
+            lobes: Vec::new(),
+            color_table: ColorTable::white(),
+            flakes: None,
+        }
+    }
+
+    /// What an instrument reads on a paint.
+    fn read_on(paint: &CarPaint) -> MultiAngle {
+        let reflectance = Reflectance::new(paint);
+        let row = |(&angle, (wi, wo)): (&f64, ([f64; 3], [f64; 3]))| {
+            let lab = Lab::from_rgb(reflectance.evaluate(wi, wo, Chi::Table).map(|f| f * PI));
+            vec![angle, 0.5, lab.l, lab.a, lab.b]
+        };
+        MultiAngle {
+            illumination_deg: 45.0,
+            illuminant: Illuminant::D65,
+            observer: Observer::Two,
+            columns: ["aspecular_deg", "graininess", "L", "a", "b"]
+                .map(str::to_owned)
+                .to_vec(),
+            rows: ASPECULAR_DEG
+                .iter()
+                .zip(instrument_pairs())
+                .map(row)
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn a_paint_agrees_with_its_own_readings_and_differs_from_anothers() {
+        let own = against_readings(&gray(0.2), &read_on(&gray(0.2))).expect("L, a, b");
+        assert_eq!(own.rows.len(), 6);
+        assert!(own.worst < 1e-9 && !own.approximate, "{own:?}");
+        let other = against_readings(&gray(0.2), &read_on(&gray(0.3))).expect("L, a, b");
+        assert!(
+            other.median > 5.0 && other.worst >= other.median,
+            "{other:?}"
+        );
+    }
+
+    #[test]
+    fn spectra_and_viewers_below_the_paint_are_left_out() {
+        let mut readings = read_on(&gray(0.2));
+        readings.rows.push(vec![-50.0, 0.5, 50.0, 0.0, 0.0]);
+        readings.observer = Observer::Ten;
+        let own = against_readings(&gray(0.2), &readings).expect("L, a, b");
+        assert!(own.rows.len() == 6 && own.approximate, "{own:?}");
+        readings.columns[2] = "nm400".to_owned();
+        assert_eq!(against_readings(&gray(0.2), &readings), None);
+    }
+}

@@ -1,0 +1,257 @@
+//! Checks of transport, blend, realisation, and of the machine under them.
+
+use super::{Check, Stream, Subject};
+use crate::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
+use crate::color::ciede2000;
+use crate::paint::{CarPaint, Chi, Limits, Reflectance};
+use crate::transport::{Cost, Method, Plan, Problem, Workspace, solve};
+
+/// Slices that are transported one by one.
+const SLICES: usize = 100;
+/// Of those, every how many-th is also given to the linear program.
+const WITH_LP_EVERY: usize = 10;
+
+/// Cluster centers and probabilities of slice `k`, counted round; a paint without flakes is one black cluster.
+fn cloud(paint: &CarPaint, k: usize) -> (Vec<[f64; 3]>, Vec<f64>) {
+    let Some(flakes) = &paint.flakes else {
+        return (vec![[0.0; 3]], vec![1.0]);
+    };
+    let slice = flakes.slice_at(k % flakes.slices());
+    (0..slice.probability.len())
+        .filter(|&c| slice.probability[c] > 0.0)
+        .map(|c| (slice.center(c), slice.probability[c]))
+        .unzip()
+}
+
+/// How far the plan's marginals are from the problem's masses at the worst.
+fn marginal_error(problem: &Problem, plan: &Plan) -> f64 {
+    let mut sent: Vec<f64> = problem.source().masses().to_vec();
+    let mut got: Vec<f64> = problem.target().masses().to_vec();
+    for entry in &plan.entries {
+        sent[entry.source] -= entry.mass;
+        got[entry.target] -= entry.mass;
+    }
+    sent.iter().chain(&got).fold(0.0, |m, v| v.abs().max(m))
+}
+
+/// The exact solver on slices of both paints: marginals, its own certificate, and another solver.
+pub(super) fn transport(subject: &Subject<'_>) -> Vec<Check> {
+    let mut workspace = Workspace::default();
+    let (mut refused, mut silent, mut compared) = (0, 0, 0);
+    let (mut marginal, mut gap, mut apart) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for k in 0..SLICES {
+        // Steps that are prime to most grids visit slices all over them.
+        let ((s, p), (t, q)) = (cloud(subject.paint, 37 * k), cloud(subject.partner, 37 * k));
+        let Ok(problem) = Problem::new(&s, &p, &t, &q) else {
+            refused += 1;
+            continue;
+        };
+        let Ok(plan) = solve(&problem, Method::Exact, Cost::Distance, &mut workspace) else {
+            refused += 1;
+            continue;
+        };
+        marginal = marginal.max(marginal_error(&problem, &plan));
+        gap = gap.max(plan.gap / (plan.cost + 1e-3));
+        if k % WITH_LP_EVERY == 0 {
+            match solve(
+                &problem,
+                Method::LinearProgram,
+                Cost::Distance,
+                &mut workspace,
+            ) {
+                Ok(other) => {
+                    compared += 1;
+                    apart = apart.max((other.cost - plan.cost).abs() / (plan.cost + 1e-3));
+                }
+                Err(_) => silent += 1,
+            }
+        }
+    }
+    let mut checks = vec![
+        Check::none("transport of 100 slices", refused, "slices refused"),
+        Check::at_most(
+            "masses before and after transport",
+            marginal,
+            1e-12,
+            "of a mass of 1",
+        ),
+        Check::at_most("gap to the dual bound", gap, 1e-9, "of the cost"),
+    ];
+    if compared > 0 {
+        checks.push(Check::at_most(
+            "cost against a linear program's",
+            apart,
+            1e-9,
+            "of the cost",
+        ));
+    }
+    checks.push(Check::at_most(
+        "the linear program gave no answer",
+        f64::from(silent),
+        5.0,
+        "of 10 slices",
+    ));
+    checks
+}
+
+fn blend(first: &CarPaint, second: &CarPaint) -> Option<Blend> {
+    let ingredients =
+        [("first", first), ("second", second)].map(|(name, paint)| Ingredient { name, paint });
+    Blend::new(&ingredients, &BlendSettings::default(), &|_| ()).ok()
+}
+
+fn at(blend: &Blend, weights: [f64; 2]) -> Option<CarPaint> {
+    let weights = RealisationWeights::even(weights.to_vec());
+    blend.realise(&weights).ok().map(|realised| realised.paint)
+}
+
+/// At weight 1 the blend is the paint; and a blend is its reverse.
+pub(super) fn ends(subject: &Subject<'_>) -> Vec<Check> {
+    let (a, b) = (subject.paint, subject.partner);
+    let (Some(forth), Some(back)) = (blend(a, b), blend(b, a)) else {
+        return vec![Check::none("blend with a sample", 1, "blends refused")];
+    };
+    let mut differing = 0;
+    let mut mean = 0.0_f64;
+    match at(&forth, [1.0, 0.0]) {
+        Some(end) => {
+            differing += usize::from(end.coat != a.coat) + usize::from(end.diffuse != a.diffuse);
+            // Slices of the paint's own grid, by what they reflect: probabilities regroup to 1e-12.
+            let (end, own) = (Reflectance::new(&end), &subject.reflectance);
+            for (wi, wo) in crate::paint::instrument_pairs() {
+                let terms = |r: &Reflectance<'_>| r.terms(wi, wo, Chi::Table);
+                if let (Some(x), Some(y)) = (terms(&end), terms(own)) {
+                    for (x, y) in x.flakes.iter().zip(y.flakes) {
+                        mean = mean.max((x - y).abs() / (y.abs() + 1e-6));
+                    }
+                }
+            }
+        }
+        None => differing += 1,
+    }
+    let turned = [0.0, 0.3, 1.0, -2.0]
+        .into_iter()
+        .filter(|&t| at(&forth, [1.0 - t, t]) != at(&back, [t, 1.0 - t]));
+    vec![
+        Check::none(
+            "a blend at weight 1 of the paint",
+            differing,
+            "parameters differ",
+        ),
+        Check::at_most("and its flakes' mean", mean, 1e-9, "relative"),
+        Check::none("a blend and its reverse", turned.count(), "weights differ"),
+    ]
+}
+
+/// Random steps of the weights against the Lipschitz bound of the boxes: `Σ|Δw| · largest corner`, and f32's rounding.
+pub(super) fn steps(subject: &Subject<'_>) -> Vec<Check> {
+    let case = "jump of a flake over its Lipschitz bound, 200 steps";
+    let Some(blend) = blend(subject.paint, subject.partner) else {
+        return vec![Check::none(case, 1, "blends refused")];
+    };
+    let corners = |paint: Option<CarPaint>| -> Vec<f64> {
+        let flakes = paint.and_then(|p| p.flakes);
+        let both = flakes.iter().flat_map(|f| f.lower.iter().chain(&f.upper));
+        both.flatten().map(|v| f64::from(*v)).collect()
+    };
+    let (a, b) = (
+        corners(at(&blend, [1.0, 0.0])),
+        corners(at(&blend, [0.0, 1.0])),
+    );
+    // Corners of one box change places when it is turned inside out: the larger of the two counts for both.
+    let half = a.len() / 2;
+    let reach = |k: usize| {
+        let at = |list: &[f64]| list[k % half].abs().max(list[k % half + half].abs());
+        at(&a).max(at(&b))
+    };
+    let mut random = Stream(3);
+    let (mut t, mut before, mut worst) = (0.5, corners(at(&blend, [0.5, 0.5])), 0.0_f64);
+    for _ in 0..200 {
+        let size = 10.0_f64.powf(random.within(-6.0, -1.0));
+        let next = (t + size * random.within(-1.0, 1.0)).clamp(-1.0, 2.0);
+        let after = corners(at(&blend, [1.0 - next, next]));
+        let step = 2.0 * (next - t).abs();
+        for (k, (x, y)) in after.iter().zip(&before).enumerate() {
+            let rounding = f64::from(f32::EPSILON) * x.abs().max(y.abs()) + 1e-30;
+            let bound = step * reach(k) + rounding + 1e-12 * reach(k);
+            worst = worst.max((x - y).abs() / bound);
+        }
+        (t, before) = (next, after);
+    }
+    vec![Check::at_most(case, worst, 1.0, "of the bound")]
+}
+
+/// Weights far from any paint still give one.
+pub(super) fn far_weights(subject: &Subject<'_>) -> Vec<Check> {
+    let far = [
+        [-3.0, 4.0],
+        [4.0, -3.0],
+        [0.0, 0.0],
+        [1e12, -1e12],
+        [1e-12, 0.0],
+    ];
+    let blend = blend(subject.paint, subject.partner);
+    let wrong = far.into_iter().filter(|weights| {
+        let paint = blend.as_ref().and_then(|b| at(b, *weights));
+        paint.is_none_or(|p| p.validate(&Limits::default()).is_err())
+    });
+    let wrong = wrong.count();
+    let nan = blend.and_then(|b| at(&b, [f64::NAN, 1.0])).is_some();
+    vec![
+        Check::none(
+            "weights from (-3, 4) to (1e12, -1e12)",
+            wrong,
+            "not a paint",
+        ),
+        Check::none("a weight that is no number", usize::from(nan), "accepted"),
+    ]
+}
+
+/// The same bits on any number of threads, and the numbers that the authors' machine computed.
+pub(super) fn machine(subject: &Subject<'_>) -> Vec<Check> {
+    let bytes = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let blend = || blend(subject.paint, subject.partner).map(|b| b.to_bytes());
+        pool.ok().and_then(|pool| pool.install(blend))
+    };
+    let first = bytes(1);
+    let differing = [2, 8]
+        .into_iter()
+        .filter(|n| first.is_none() || bytes(*n) != first);
+    // CIEDE2000 of one of Sharma's pairs to 16 digits, a transport along a line by hand, Fresnel at 60° for 1.5.
+    let known = [
+        (
+            ciede2000([50.0, 2.5, 0.0].into(), [73.0, 25.0, -18.0].into()),
+            27.149_231_300_746_26,
+        ),
+        (by_hand(), 1.75),
+        (crate::paint::fresnel(0.5, 1.5), 0.089_186_712_802_212_78),
+    ];
+    let off = known.map(|(got, want): (f64, f64)| (got / want - 1.0).abs());
+    vec![
+        Check::none("1, 2 and 8 threads", differing.count(), "answers differ"),
+        Check::at_most(
+            "numbers known beforehand",
+            off.into_iter().fold(0.0, f64::max),
+            1e-12,
+            "relative",
+        ),
+    ]
+}
+
+/// Half the mass goes by 1, a quarter by 2, a quarter by 3: 1.75.
+fn by_hand() -> f64 {
+    let on_line = |x: [f64; 3]| x.map(|x| [x, 0.0, 0.0]);
+    let (from, to) = (on_line([0.0, 10.0, 20.0]), on_line([1.0, 12.0, 23.0]));
+    let masses = [0.5, 0.25, 0.25];
+    Problem::new(&from, &masses, &to, &masses)
+        .and_then(|problem| {
+            solve(
+                &problem,
+                Method::Exact,
+                Cost::Distance,
+                &mut Workspace::default(),
+            )
+        })
+        .map_or(f64::NAN, |plan| plan.cost)
+}

@@ -1,0 +1,209 @@
+//! What carpaint's steps cost, each beside its limit or its peer, measured in the same run.
+//!
+//! ```text
+//! cargo run --release --example ratios -- A.zip B.zip [--only realise|bundle|glb|blend|disk]
+//! ```
+//!
+//! Processor time of this thread comes from the scheduler's own account, since wall time says little on a busy machine;
+//! where that account is missing (other systems than Linux), wall time stands in and the head of the table says so.
+//! Every figure is the median of several runs.
+
+use std::error::Error;
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Instant;
+
+use carpaint::accuracy::Profile;
+use carpaint::blend::{Blend, RealisationWeights};
+use carpaint::export::{About, bundle, glb};
+use carpaint::paint::{PaintFile, Provenance};
+use carpaint::workshop::{IngestOptions, blend_paints, ingest};
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+fn main() -> Outcome<()> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let only = words
+        .iter()
+        .position(|w| w == "--only")
+        .and_then(|k| words.get(k + 1))
+        .cloned();
+    let inputs: Vec<&String> = words.iter().take_while(|w| *w != "--only").collect();
+    if inputs.len() < 2 {
+        return Err("usage: ratios A.zip B.zip [C.zip] [--only STEP]".into());
+    }
+    let wanted = |step: &str| only.as_deref().is_none_or(|only| only == step);
+    println!("| step | measured | beside it | ratio | clock |");
+    println!("|---|---|---|---|---|");
+    if wanted("disk") {
+        from_disk(&inputs)?;
+    }
+    let paints = ingest_all(&inputs)?;
+    if wanted("blend") {
+        again(&paints)?;
+    }
+    let blend = blended(&paints)?;
+    if wanted("realise") {
+        realise(&blend)?;
+    }
+    let even = RealisationWeights::even(vec![1.0 / inputs.len() as f64; inputs.len()]);
+    let realised = blend.realise(&even)?.paint;
+    let about = About {
+        name: "bench".to_owned(),
+        provenance: Provenance::default(),
+        report: serde_json::Value::Null,
+    };
+    let settings = Profile::standard().export;
+    if wanted("bundle") {
+        let bytes = bundle(&realised, &about, &settings)?;
+        let ours = cpu(9, || bundle(&realised, &about, &settings).map(|b| b.len()));
+        let copy = cpu(9, || black_box(&bytes).clone().len());
+        row("realisation to bundle bytes", ours, "copying them", copy);
+    }
+    if wanted("glb") {
+        let bytes = glb(&realised, &about, &settings)?;
+        let ours = cpu(9, || glb(&realised, &about, &settings).map(|b| b.len()));
+        let copy = cpu(9, || black_box(&bytes).clone().len());
+        row("realisation to GLB bytes", ours, "copying them", copy);
+    }
+    Ok(())
+}
+
+fn row(step: &str, ours: f64, beside: &str, limit: f64) {
+    println!(
+        "| {step} | {:.3} ms | {beside} {:.3} ms | {:.2} | {} |",
+        ours * 1e3,
+        limit * 1e3,
+        ours / limit,
+        if thread_seconds().is_some() {
+            "processor"
+        } else {
+            "wall"
+        }
+    );
+}
+
+/// Two packages on disk to a blend on disk, beside reading and inflating them.
+fn from_disk(inputs: &[&String]) -> Outcome<()> {
+    let out = tempfile::NamedTempFile::new()?;
+    let mut seconds = Vec::new();
+    for _ in 0..7 {
+        let begin = Instant::now();
+        let paints = ingest_all(inputs)?;
+        std::fs::write(out.path(), blended(&paints)?.to_bytes())?;
+        seconds.push(begin.elapsed().as_secs_f64());
+    }
+    let mut limit = Vec::new();
+    for _ in 0..7 {
+        let begin = Instant::now();
+        for input in inputs {
+            black_box(std::fs::read(input)?);
+        }
+        limit.push(begin.elapsed().as_secs_f64());
+    }
+    let (ours, limit) = (median(seconds), median(limit));
+    println!(
+        "| packages on disk to a blend on disk | {:.1} ms | reading them {:.1} ms | {:.1} | wall |",
+        ours * 1e3,
+        limit * 1e3,
+        ours / limit
+    );
+    Ok(())
+}
+
+fn ingest_all(inputs: &[&String]) -> Outcome<Vec<PaintFile>> {
+    let options = IngestOptions::default();
+    Ok(inputs
+        .iter()
+        .map(|input| ingest(Path::new(input), &options, &|_| ()))
+        .collect::<Result<_, _>>()?)
+}
+
+fn blended(paints: &[PaintFile]) -> Outcome<Blend> {
+    let paints: Vec<&PaintFile> = paints.iter().collect();
+    Ok(blend_paints(&paints, &Profile::standard(), &|_| ())?.blend)
+}
+
+/// Blending again what is already ingested; all cores.
+fn again(paints: &[PaintFile]) -> Outcome<()> {
+    let slices = blended(paints)?.report().slices;
+    let mut seconds = Vec::new();
+    for _ in 0..15 {
+        let begin = Instant::now();
+        black_box(blended(paints)?);
+        seconds.push(begin.elapsed().as_secs_f64());
+    }
+    let limit = 0.030 * slices as f64 / 576.0;
+    println!(
+        "| ingested paints to a blend, {slices} slices | {:.1} ms | allowed {:.1} ms | {:.2} | wall, all cores |",
+        median(seconds.clone()) * 1e3,
+        limit * 1e3,
+        median(seconds) / limit
+    );
+    Ok(())
+}
+
+/// A realisation in memory beside a·X + b·Y over the same bytes.
+fn realise(blend: &Blend) -> Outcome<()> {
+    let count = blend.ingredients().count();
+    let weights = RealisationWeights::even(vec![1.0 / count as f64; count]);
+    let clusters = blend
+        .realise(&weights)?
+        .paint
+        .flakes
+        .map_or(0, |f| f.clusters());
+    let ours = cpu(15, || blend.realise(&weights).map(|r| r.paint.lobes.len()));
+    // The boxes of every paint are read and one set of boxes is written: six numbers a cluster.
+    let inputs: Vec<Vec<f32>> = (0..count)
+        .map(|k| (0..clusters * 6).map(|i| (i % 97 + k) as f32).collect())
+        .collect();
+    let loop_only = cpu(15, || {
+        let (x, y) = (black_box(&inputs[0]), black_box(&inputs[1]));
+        let mut out: Vec<f32> = x.iter().zip(y).map(|(x, y)| 0.5 * x + 0.5 * y).collect();
+        for z in &inputs[2..] {
+            for (o, z) in out.iter_mut().zip(black_box(z)) {
+                *o += 0.5 * z;
+            }
+        }
+        black_box(&out).len()
+    });
+    row(
+        &format!("one realisation, {clusters} clusters"),
+        ours,
+        "a·X + b·Y",
+        loop_only,
+    );
+    Ok(())
+}
+
+/// Seconds of processor time of a step: the median of `batches`, each of as many runs as fill 60 ms, for the scheduler
+/// keeps its account in ticks.
+fn cpu<T>(batches: usize, mut step: impl FnMut() -> T) -> f64 {
+    black_box(step());
+    let seconds = (0..batches).map(|_| {
+        let wall = Instant::now();
+        let before = thread_seconds();
+        let mut runs = 0.0;
+        while wall.elapsed().as_secs_f64() < 0.06 {
+            black_box(step());
+            runs += 1.0;
+        }
+        match (before, thread_seconds()) {
+            (Some(before), Some(after)) => (after - before) / runs,
+            _ => wall.elapsed().as_secs_f64() / runs,
+        }
+    });
+    median(seconds.collect())
+}
+
+/// Processor seconds of this thread so far.
+fn thread_seconds() -> Option<f64> {
+    let account = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    let nanoseconds: u64 = account.split_whitespace().next()?.parse().ok()?;
+    Some(nanoseconds as f64 * 1e-9)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}

@@ -1,0 +1,147 @@
+//! The service with the real workshop behind it: uploads that are fitted, grids that differ, work that is called off.
+
+use std::time::{Duration, Instant};
+
+use carpaint::accuracy::Profile;
+use carpaint::fit::ClusterSettings;
+use carpaint::workshop::sample_by_name;
+use serde_json::{Value, json};
+
+use crate::house::House;
+
+/// A table in the layout of the MPI car paints: a wide lobe over a diffuse base.
+fn table(diffuse: f32) -> Vec<u8> {
+    let mut bytes = vec![0; 84];
+    for _channel in 0..3 {
+        for h in 0..90_u16 {
+            let lobe = 0.4 * (-f32::from(h * h) / 400.0).exp();
+            for _ in 0..90 * 180 {
+                bytes.extend_from_slice(&(diffuse + lobe).to_le_bytes());
+            }
+        }
+    }
+    bytes
+}
+
+/// A metallic sample of few clusters, at every so many-th angle.
+fn metallic(name: &str, angle_step: usize) -> Vec<u8> {
+    let draft = Profile::draft();
+    let profile = Profile {
+        flakes: ClusterSettings {
+            clusters: 8,
+            angle_step,
+            ..draft.flakes
+        },
+        ..draft
+    };
+    let sample = sample_by_name(name).expect("a sample");
+    sample.build(&profile, &|_| ()).expect("builds").to_bytes()
+}
+
+async fn upload(house: &House, bytes: &[u8]) -> Value {
+    let headers = [("Prefer", "wait=300")];
+    let answer = house.ask("POST", "/v1/paints", &headers, bytes).await;
+    assert_eq!(
+        answer.status,
+        201,
+        "{}",
+        String::from_utf8_lossy(&answer.body)
+    );
+    answer.json()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again() {
+    let data = tempfile::tempdir().expect("temporary folder");
+    let house = House::real(data.path()).await;
+    let fine = upload(&house, &metallic("bmw339", 1)).await;
+    let coarse = upload(&house, &metallic("ford_f8", 2)).await;
+    assert_eq!(fine["provenance"]["simulated_flakes"], true);
+    let order = json!({ "paints": [fine["id"], coarse["id"]], "profile": "draft" });
+    let blend = house.post_json("/v1/blends", &order.to_string()).await;
+    assert_eq!(blend.status, 201, "{blend:?}");
+    let blend = blend.json();
+    let correspondence = &blend["correspondence"];
+    assert_eq!(correspondence["order"], "content hash");
+    assert_eq!(correspondence["mixed"][0]["name"], "ford_f8");
+    assert_eq!(correspondence["mixed"][0]["place"], 1);
+
+    let base = blend["links"]["self"].as_str().expect("an address");
+    let picture = "weights=3,-2&size=24x24&spp=1";
+    let drawn = house.get(&format!("{base}/preview.png?{picture}")).await;
+    assert_eq!((drawn.status, &drawn.body[..4]), (200, &b"\x89PNG"[..]));
+    let report = house.get(&format!("{base}/preview.json?{picture}")).await;
+    let report = report.json();
+    assert!(
+        report["rendering"]["plan"].is_object() || report["rendering"]["plan"].is_array(),
+        "{report}"
+    );
+    let clamps = &report["realisation"]["clamps"];
+    assert!(
+        clamps.as_array().is_some_and(|list| !list.is_empty()),
+        "{report}"
+    );
+
+    let file = house
+        .get(&format!("{base}/realisation.paint?weights=3,-2"))
+        .await;
+    let again = upload(&house, &file.body).await;
+    assert_eq!(again["provenance"]["simulated_flakes"], true);
+    assert_eq!(
+        again["provenance"]["realisation"]["base"],
+        json!([3.0, -2.0])
+    );
+    assert_eq!(&again["clamps"], clamps);
+    let order = json!({ "paints": [again["id"], fine["id"]], "clusters": 4 });
+    let blend = house.post_json("/v1/blends", &order.to_string()).await;
+    let reduced = blend.json()["correspondence"]["reduced"].clone();
+    assert_eq!(
+        (&reduced[0]["place"], &reduced[0]["to"]),
+        (&json!(0), &json!(4))
+    );
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_table_is_fitted_with_progress_and_its_fit_can_be_called_off() {
+    let data = tempfile::tempdir().expect("temporary folder");
+    let house = House::real(data.path()).await;
+    let at_once = [("Prefer", "respond-async")];
+    let answer = house.ask("POST", "/v1/paints", &at_once, &table(0.1)).await;
+    let job = answer.header("location").expect("a job").to_owned();
+    let begun = Instant::now();
+    loop {
+        let told = house.get(&job).await.json();
+        assert!(
+            told["state"] == "queued" || told["state"] == "running",
+            "{told}"
+        );
+        if told["progress"].as_f64() > Some(0.1) {
+            break;
+        }
+        assert!(begun.elapsed() < Duration::from_mins(2), "{told}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    let cancelled = house.ask("DELETE", &job, &[], b"").await;
+    assert_eq!(cancelled.status, 200, "{cancelled:?}");
+    let begun = Instant::now();
+    while house.get(&job).await.json()["state"] != "cancelled" {
+        assert!(begun.elapsed() < Duration::from_mins(1));
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+
+    let bytes = table(0.2);
+    let paint = upload(&house, &bytes).await;
+    assert_eq!(paint["name"], "unnamed mpi-2005");
+    assert_eq!(paint["provenance"]["source"], "mpi-2005");
+    let hash = blake3::hash(&bytes).to_hex().to_string();
+    assert_eq!(paint["provenance"]["hashes"], json!([hash]));
+
+    let unknown = house
+        .ask("POST", "/v1/paints", &[], b"neither this nor that")
+        .await;
+    let problem = unknown.problem(422, "unusable-measurement");
+    assert_eq!(problem["pointer"], "/layout");
+    assert_eq!(problem["accepted"], "rgl, mpi-2005, merl or package");
+    house.close().await;
+}

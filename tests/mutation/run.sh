@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# Breaks the rooms color, transport, paint and blend in every way that cargo-mutants knows, and counts what the tests
+# notice. Arguments go to cargo-mutants, for example `--shard 0/8` or `--file src/color/lab.rs`.
+#
+# The four rooms need no other, so they are copied, with their unit tests and the part of the stability suite that is
+# about them, into a crate of their own in target/mutation, the suite compiled into the unit tests: a broken variant is
+# then one short compilation. Needs `cargo install cargo-mutants --locked`.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+rooms="color transport paint blend"
+suites="blends color realisation reflectance transport"
+crate="${CARPAINT_MUTATION:-target/mutation}"
+rm -rf "$crate/src" "$crate/.cargo"
+mkdir -p "$crate/src" "$crate/.cargo"
+cp Cargo.lock .clippy.toml "$crate/"
+cp .cargo/mutants.toml "$crate/.cargo/"
+
+{
+  echo '//! The rooms whose arithmetic everything else stands on.'
+  echo '#![allow(missing_docs, dead_code)]'
+  echo 'extern crate self as carpaint;'
+  for room in $rooms; do
+    cp -r "src/$room" "$crate/src/"
+    echo "pub mod $room;"
+  done
+  echo '#[cfg(test)] mod paints;'
+  cp tests/stability/paints.rs "$crate/src/"
+  for suite in $suites; do
+    mkdir -p "$crate/src/suite/$suite"
+    cp "tests/stability/$suite.rs" "$crate/src/suite/$suite/mod.rs"
+    if [ -d "tests/stability/$suite" ]; then cp -r "tests/stability/$suite/." "$crate/src/suite/$suite/"; fi
+    echo "#[cfg(test)] #[path = \"suite/$suite/mod.rs\"] mod suite_$suite;"
+  done
+  # Tables that tests read stand where the tests look for them: beside the suite, and where unit tests see it.
+  mkdir -p "$crate/tests/stability"
+  cp tests/stability/*.txt "$crate/src/suite/color/"
+  cp tests/stability/*.txt "$crate/tests/stability/"
+} > "$crate/src/lib.rs"
+
+# The manifest without its programs, examples and other tests; dependencies and profiles stay as they are.
+awk '/^\[\[/ { skip = 1 } /^\[[^[]/ { skip = 0 } !skip && !/^default-run/' Cargo.toml > "$crate/Cargo.toml"
+printf '\n[workspace]\n' >> "$crate/Cargo.toml"
+
+# A twentieth of a per cent of the random problems: what a break does to transport shows in the first hundred.
+export CARPAINT_FUZZ="${CARPAINT_FUZZ:-300}" PROPTEST_CASES="${PROPTEST_CASES:-64}"
+cd "$crate"
+exec cargo mutants --in-place "$@"

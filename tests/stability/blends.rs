@@ -1,0 +1,407 @@
+//! Blends at their ends, in other orders, and of paints that hardly blend.
+
+use crate::paints::{D, H, Stream, blend, flakes, metallic, pairs, realise, solid};
+use carpaint::blend::{Blend, BlendError, BlendSettings, Ingredient, RealisationWeights};
+use carpaint::paint::{CarPaint, Chi, Coat, Flakes, Limits, Lobe, Reflectance};
+use std::collections::BTreeMap;
+
+/// Probability by box of one slice: what is left when clusters that carry the same box are merged again.
+fn regrouped(flakes: &Flakes, slice: usize) -> BTreeMap<[u32; 6], f64> {
+    let slice = flakes.slice_at(slice);
+    let mut groups = BTreeMap::new();
+    for (k, p) in slice.probability.iter().enumerate() {
+        let (l, u) = (slice.lower[k], slice.upper[k]);
+        // A box at −0 is the box at 0.
+        let key = [l[0], l[1], l[2], u[0], u[1], u[2]].map(|v| (v + 0.0).to_bits());
+        *groups.entry(key).or_insert(0.0) += p;
+    }
+    groups
+}
+
+/// The original's own numbers, bit for bit, and its slices: boxes bit for bit, probabilities within 1e-12.
+fn assert_is(paint: &CarPaint, original: &CarPaint, what: &str) {
+    let present = |lobes: &[Lobe]| -> Vec<Lobe> {
+        let mut list: Vec<Lobe> = lobes.iter().copied().filter(|l| !l.is_absent()).collect();
+        list.sort_by(|x, y| x.alpha.total_cmp(&y.alpha));
+        list
+    };
+    assert_eq!(paint.coat, original.coat, "{what}");
+    assert_eq!(paint.diffuse, original.diffuse, "{what}");
+    assert_eq!(present(&paint.lobes), present(&original.lobes), "{what}");
+    let (Some(got), Some(want)) = (&paint.flakes, &original.flakes) else {
+        assert_eq!(paint.flakes.is_some(), original.flakes.is_some(), "{what}");
+        return;
+    };
+    assert_eq!(got.texture, want.texture, "{what}");
+    for (h, theta_h) in want.theta_h.degrees().iter().enumerate() {
+        for (d, theta_d) in want.theta_d.degrees().iter().enumerate() {
+            let place =
+                |grid: &[f64], x: &f64| grid.iter().position(|y| y == x).expect("on the grid");
+            let (row, column) = (
+                place(got.theta_h.degrees(), theta_h),
+                place(got.theta_d.degrees(), theta_d),
+            );
+            let got = regrouped(got, row * got.theta_d.len() + column);
+            let want = regrouped(want, h * want.theta_d.len() + d);
+            assert!(
+                got.keys().eq(want.keys()),
+                "{what}: boxes differ in slice {h}, {d}"
+            );
+            for (x, y) in got.values().zip(want.values()) {
+                // Masses are whole units of 2^-55; a hundred clusters round by less than 1e-14.
+                assert!((x - y).abs() <= 1e-12, "{what}: {x} {y}");
+            }
+        }
+    }
+}
+
+fn unit_weights(n: usize, k: usize) -> Vec<f64> {
+    (0..n).map(|m| if m == k { 1.0 } else { 0.0 }).collect()
+}
+
+#[test]
+fn at_weight_one_of_a_paint_the_blend_is_that_paint_to_the_bit() {
+    for (n, seed) in [(2, 100), (3, 200), (4, 300), (5, 400)] {
+        let paints: Vec<CarPaint> = (0..n).map(|k| metallic(seed + k, H, D)).collect();
+        let blend = blend(&paints.iter().collect::<Vec<_>>());
+        for (k, original) in paints.iter().enumerate() {
+            let realised = realise(&blend, &unit_weights(paints.len(), k));
+            assert!(realised.clamps.is_empty(), "{:?}", realised.clamps);
+            assert_is(&realised.paint, original, &format!("paint {k} of {n}"));
+            assert_eq!(realised.paint.color_table, original.color_table);
+        }
+    }
+}
+
+#[test]
+fn a_coat_that_only_one_paint_has_or_whose_thickness_only_one_knows_comes_back_as_it_was() {
+    let coat = |ior, roughness, thickness_um| {
+        Some(Coat {
+            ior,
+            roughness,
+            thickness_um,
+        })
+    };
+    let coats = [
+        None,
+        coat(1.5, 0.02, None),
+        coat(1.4, 0.3, Some(40.0)),
+        coat(1.6, 0.0, Some(35.5)),
+        coat(1.0, 0.1, Some(1.0)),
+    ];
+    for (a, first) in coats.iter().enumerate() {
+        for (b, second) in coats.iter().enumerate() {
+            let paints = [(first, 1), (second, 2)].map(|(coat, seed)| CarPaint {
+                coat: *coat,
+                ..solid(seed)
+            });
+            let blend = blend(&[&paints[0], &paints[1]]);
+            for k in 0..2 {
+                let realised = realise(&blend, &unit_weights(2, k));
+                assert_is(
+                    &realised.paint,
+                    &paints[k],
+                    &format!("coats {a} and {b}, paint {k}"),
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_paint_with_itself_is_that_paint_at_every_weight() {
+    let a = metallic(1, H, D);
+    let blend = blend(&[&a, &a]);
+    assert_eq!(blend.report().mean_cost, 0.0);
+    for t in [0.0, 1.0] {
+        assert_is(
+            &realise(&blend, &[1.0 - t, t]).paint,
+            &a,
+            &format!("at {t}"),
+        );
+    }
+    // 0.7 + 0.3 is 1, yet 0.7 x + 0.3 x is x only to an ulp: three roundings each, in f32 for the boxes; and two powers
+    // of a roughness, whose logarithm is below 3, give it back to as many.
+    let third = realise(&blend, &[0.7, 0.3]).paint;
+    for (x, y) in third.diffuse.iter().zip(a.diffuse) {
+        assert!((x - y).abs() <= 3.0 * f64::EPSILON * y);
+    }
+    for (x, y) in third.lobes.iter().zip(&a.lobes) {
+        assert!(
+            (x.alpha / y.alpha - 1.0).abs() <= 8.0 * f64::EPSILON,
+            "{x:?} {y:?}"
+        );
+    }
+    let (got, want) = (third.flakes.expect("has"), a.flakes.expect("has"));
+    for k in 0..want.slices() {
+        for (x, y) in got.slice_at(k).mean().iter().zip(want.slice_at(k).mean()) {
+            // An ulp of f32 at L = 70 is 8e-6, and light moves by 3 f²/116 of that.
+            assert!((x - y).abs() <= 1e-6, "{x} {y}");
+        }
+    }
+}
+
+#[test]
+fn a_blend_and_its_reverse_agree_to_the_last_bit() {
+    let (a, b) = (metallic(4, H, D), metallic(5, H, &[0.0, 10.0, 25.0]));
+    let (forth, back) = (blend(&[&a, &b]), blend(&[&b, &a]));
+    for t in [0.0, 1e-9, 0.2, 0.5, 0.7, 1.0, -3.0, 4.0] {
+        let (x, y) = (
+            realise(&forth, &[1.0 - t, t]),
+            realise(&back, &[t, 1.0 - t]),
+        );
+        assert_eq!(x.paint, y.paint, "at {t}");
+        assert_eq!(x.clamps, y.clamps, "at {t}");
+    }
+}
+
+#[test]
+fn five_paints_in_any_order_are_one_blend() {
+    let paints: Vec<CarPaint> = (0..5)
+        .map(|k| metallic(500 + k, &[0.0, 20.0], &[0.0]))
+        .collect();
+    let weights = [0.3, 0.1, 0.25, -0.05, 0.4];
+    let want = realise(&blend(&paints.iter().collect::<Vec<_>>()), &weights).paint;
+    want.validate(&Limits::default()).expect("a paint");
+    for order in [[4, 3, 2, 1, 0], [1, 0, 2, 4, 3], [2, 4, 1, 3, 0]] {
+        let shuffled = order.map(|k| &paints[k]);
+        let got = realise(&blend(&shuffled), &order.map(|k| weights[k]));
+        assert_eq!(got.paint, want, "{order:?}");
+    }
+}
+
+#[test]
+fn a_paint_given_twice_counts_with_both_weights() {
+    let (a, b) = (metallic(11, H, D), metallic(12, H, D));
+    let thrice = blend(&[&a, &b, &a]);
+    let twice = blend(&[&a, &b]);
+    for (w, v) in [
+        ([0.3, 0.5, 0.2], [0.5, 0.5]),
+        ([1.0, 0.0, 0.0], [1.0, 0.0]),
+        ([0.0, 0.0, 1.0], [1.0, 0.0]),
+    ] {
+        let (x, y) = (realise(&thrice, &w).paint, realise(&twice, &v).paint);
+        let (fx, fy) = (Reflectance::new(&x), Reflectance::new(&y));
+        for (wi, wo) in pairs(60) {
+            let (x, y) = (
+                fx.evaluate(wi, wo, Chi::Table),
+                fy.evaluate(wi, wo, Chi::Table),
+            );
+            for c in 0..3 {
+                // Weights and parameters agree to an EPS or two; the exponent of a lobe multiplies that by up to 745,
+                // f32 corners add 1e-7 of the flakes. The correspondence of (a, a, b) may differ from that of (a, b),
+                // which moves means of light at inner weights: only ends are compared through flakes.
+                if w.contains(&1.0) {
+                    assert!((x[c] - y[c]).abs() <= 1e-6 * y[c] + 1e-9, "{x:?} {y:?}");
+                }
+            }
+        }
+        for (p, q) in x.diffuse.iter().zip(y.diffuse) {
+            assert!((p - q).abs() <= 4.0 * f64::EPSILON * q);
+        }
+        for (p, q) in x.lobes.iter().zip(&y.lobes) {
+            // α is a product of powers: its logarithm (below 3) rounds a few times.
+            assert!((p.alpha / q.alpha - 1.0).abs() <= 32.0 * f64::EPSILON);
+        }
+    }
+}
+
+#[test]
+fn a_billionth_beside_weight_one_is_the_same_paint_to_a_millionth() {
+    let a = metallic(21, H, D);
+    let others = [
+        metallic(22, &[0.0, 20.0], D),
+        metallic(23, H, &[0.0, 7.0, 25.0]),
+        solid(24),
+        solid(27),
+    ];
+    for other in &others {
+        let blend = blend(&[&a, other]);
+        for (near, exact) in [([1.0 - 1e-9, 1e-9], &a), ([1e-9, 1.0 - 1e-9], other)] {
+            let paint = realise(&blend, &near).paint;
+            let (near, exact) = (Reflectance::new(&paint), Reflectance::new(exact));
+            for (wi, wo) in pairs(200) {
+                let y = exact.evaluate(wi, wo, Chi::Table);
+                for (x, y) in near.evaluate(wi, wo, Chi::Table).iter().zip(y) {
+                    // 1e-9 of parameters no more than 1e3 times each other; ln α moves by 1e-9 · ln 50, D by 745 times
+                    // that at the most before it is 0. Below 1e-3 1/sr nobody sees a part in 1e6.
+                    assert!(
+                        (x - y).abs() <= 1e-6 * (y.abs() + 1e-3),
+                        "{x} instead of {y}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn masses_of_a_millionth_of_a_millionth_are_not_lost() {
+    let mut a = metallic(31, &[0.0], &[0.0]);
+    let mut masses = [1e-12; 7];
+    masses[3] = 1.0 - 6e-12;
+    a.flakes.as_mut().expect("has flakes").probability = masses.to_vec();
+    let b = metallic(32, &[0.0], &[0.0]);
+    let blend = blend(&[&a, &b]);
+    let back = realise(&blend, &[1.0, 0.0]).paint;
+    let (got, want) = (
+        regrouped(back.flakes.as_ref().expect("has"), 0),
+        regrouped(a.flakes.as_ref().expect("has"), 0),
+    );
+    for (x, y) in got.values().zip(want.values()) {
+        // A light source's mass is given back by its own units: relatively, not only absolutely.
+        assert!((x / y - 1.0).abs() <= 1e-9, "{x:e} instead of {y:e}");
+    }
+    assert_eq!(got.len(), 7);
+}
+
+#[test]
+fn paints_that_differ_by_less_than_a_rounding_blend_into_themselves() {
+    let a = metallic(41, H, D);
+    let mut b = a.clone();
+    let mut random = Stream(42);
+    let flakes = b.flakes.as_mut().expect("has flakes");
+    for corner in flakes.lower.iter_mut().chain(&mut flakes.upper) {
+        *corner = corner.map(|v| v + (1e-6 * random.unit()) as f32);
+    }
+    for (low, high) in flakes.lower.iter().zip(&mut flakes.upper) {
+        (0..3).for_each(|k| high[k] = high[k].max(low[k]));
+    }
+    b.diffuse[0] *= 1.0 + f64::EPSILON;
+    let blend = blend(&[&a, &b]);
+    // Nothing moves farther than the corners differ: 1e-6 an axis, and an ulp of f32 at 64, 7.6e-6.
+    assert!(
+        blend.report().mean_cost <= 3.0 * 8.7e-6,
+        "{:?}",
+        blend.report()
+    );
+    let half = realise(&blend, &[0.5, 0.5]).paint;
+    let means = |p: &CarPaint| Reflectance::new(p).flake_means().to_vec();
+    for (x, y) in means(&half)
+        .iter()
+        .flatten()
+        .zip(means(&a).iter().flatten())
+    {
+        assert!((x - y).abs() <= 1e-6, "{x} {y}");
+    }
+}
+
+#[test]
+fn flakes_fade_out_towards_a_solid_color_and_never_jump() {
+    let (metallic, solid) = (metallic(51, H, D), solid(52));
+    let blend = blend(&[&metallic, &solid]);
+    let energy = |t: f64| -> f64 {
+        let paint = realise(&blend, &[1.0 - t, t]).paint;
+        Reflectance::new(&paint)
+            .flake_means()
+            .iter()
+            .flatten()
+            .map(|v| v.abs())
+            .sum()
+    };
+    let steps: Vec<f64> = (0..=20).map(|k| energy(f64::from(k) / 20.0)).collect();
+    assert!(steps.windows(2).all(|w| w[1] <= w[0]), "{steps:?}");
+    // Black's Lab is 0, whose light is (16/116 − 4/29) rounded: no more than EPS.
+    assert!(steps[20] <= 36.0 * f64::EPSILON, "{steps:?}");
+    assert_is(
+        &realise(&blend, &[1.0, 0.0]).paint,
+        &metallic,
+        "the metallic",
+    );
+}
+
+#[test]
+fn differing_grids_blend_on_their_union_and_keep_every_own_slice() {
+    let (a, b) = (
+        metallic(61, &[0.0, 12.0, 30.0], &[0.0, 25.0]),
+        metallic(62, &[5.0, 12.0, 60.0], &[10.0]),
+    );
+    let blend = blend(&[&a, &b]);
+    let (of_a, of_b) = (
+        realise(&blend, &[1.0, 0.0]).paint,
+        realise(&blend, &[0.0, 1.0]).paint,
+    );
+    let flakes = of_a.flakes.as_ref().expect("has flakes");
+    assert_eq!(flakes.theta_h.degrees(), [0.0, 5.0, 12.0, 30.0, 60.0]);
+    assert_eq!(flakes.theta_d.degrees(), [0.0, 10.0, 25.0]);
+    assert_is(&of_a, &a, "a");
+    assert_is(&of_b, &b, "b");
+    // In between a mixture of neighbours has exactly the interpolated mean: the functions are one everywhere.
+    for (mixed, own) in [(&of_a, &a), (&of_b, &b)] {
+        let (mixed, own) = (Reflectance::new(mixed), Reflectance::new(own));
+        for (wi, wo) in pairs(300) {
+            let (x, y) = (
+                mixed.terms(wi, wo, Chi::Table),
+                own.terms(wi, wo, Chi::Table),
+            );
+            let (x, y) = (x.expect("above"), y.expect("above"));
+            for c in 0..3 {
+                // Probabilities are regrouped to 1e-12 and colors are below 1.
+                assert!((x.flakes[c] - y.flakes[c]).abs() <= 1e-12, "{x:?} {y:?}");
+            }
+        }
+    }
+    assert_eq!(blend.report().mixed.len(), 2);
+}
+
+#[test]
+fn halfway_between_two_peaks_is_one_peak_and_not_two() {
+    // Two peaks of ten clusters each: halfway lies at 50 to 59.5, where a mixture would have stayed at 20 and at 80.
+    let spread = |l: f32| -> CarPaint {
+        let cluster = |k: u8| {
+            let corner = l + f32::from(k);
+            (0.1, [corner, 0.0, 0.0], [corner + 0.5, 0.0, 0.0])
+        };
+        CarPaint {
+            flakes: Some(flakes(
+                &[0.0],
+                &[0.0],
+                &(0..10).map(cluster).collect::<Vec<_>>(),
+            )),
+            ..solid(71)
+        }
+    };
+    let blend = blend(&[&spread(20.0), &spread(80.0)]);
+    let half = realise(&blend, &[0.5, 0.5]).paint.flakes.expect("has");
+    assert!(half.probability.len() <= 19);
+    for (low, high) in half.lower.iter().zip(&half.upper) {
+        // Monotone: the k-th of one with the k-th of the other, at 50 + k, exact in f32.
+        assert!(low[0] >= 50.0 && high[0] <= 59.5, "{low:?} {high:?}");
+    }
+    // And it is as wide as the two it lies between, where the reversed plan of equal cost would have been a point. (The
+    // tie-break tells two clusters apart from 0.13 L on: 2 ΔL² · 5e-10/D against the prices' 4e-15 D, D = 70.)
+    let center = |k: usize| f64::from(half.lower[k][0] + half.upper[k][0]) / 2.0;
+    let mean: f64 = (0..half.probability.len())
+        .map(|k| half.probability[k] * center(k))
+        .sum();
+    let spread = (0..half.probability.len())
+        .map(|k| half.probability[k] * (center(k) - mean).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    // Ten points 1 apart: √((100 − 1)/12), of masses good to 1e-14.
+    assert!(
+        (spread - (99.0_f64 / 12.0).sqrt()).abs() < 1e-10,
+        "{spread}"
+    );
+}
+
+#[test]
+fn one_paint_or_six_are_refused_with_their_number() {
+    let a = solid(81);
+    let ingredients = |n: usize| {
+        vec![
+            Ingredient {
+                name: "a",
+                paint: &a
+            };
+            n
+        ]
+    };
+    for n in [0, 1, 6] {
+        let refused = Blend::new(&ingredients(n), &BlendSettings::default(), &|_| ());
+        assert_eq!(refused.expect_err("refused"), BlendError::Paints(n));
+    }
+    let five = Blend::new(&ingredients(5), &BlendSettings::default(), &|_| ()).expect("five");
+    five.realise(&RealisationWeights::even(vec![0.2; 5]))
+        .expect("five weights");
+}
