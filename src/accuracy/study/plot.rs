@@ -75,7 +75,7 @@ fn number(value: f64) -> String {
     } else if value >= 1.0 {
         format!("{value:.0}")
     } else {
-        let digits = (-value.log10().floor()).max(1.0);
+        let digits = (-value.log10().floor()).clamp(1.0, 9.0);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few digits
         let digits = digits as usize;
         format!("{value:.digits$}")

@@ -24,8 +24,10 @@ impl Clock {
     pub fn seconds(&self, threads: usize) -> f64 {
         let wall = self.wall.elapsed().as_secs_f64();
         match (self.processor, processor_seconds()) {
-            // More than the wall's is none of this work's.
-            (Some(before), Some(now)) => ((now - before) / threads.max(1) as f64).min(wall),
+            // More than the wall's is none of this work's; nothing at all is an account that was not kept.
+            (Some(before), Some(now)) if now > before => {
+                ((now - before) / threads.max(1) as f64).min(wall)
+            }
             _ => wall,
         }
     }
@@ -42,6 +44,8 @@ pub(super) fn name() -> &'static str {
 
 /// Processor time of all threads of this process, seconds.
 fn processor_seconds() -> Option<f64> {
+    // The account of a running thread is brought up to date when it gives way; those that wait have given theirs.
+    std::thread::yield_now();
     let tasks = std::fs::read_dir("/proc/self/task").ok()?;
     let mut nanoseconds = 0_u64;
     for task in tasks.flatten() {
