@@ -30,7 +30,7 @@ pub struct ResultError {
 /// One term of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Term {
-    /// What it is about: `clusters`, `transport`, `rounding`.
+    /// What it is about: `clusters`, `transport`, `angles`, `rounding`.
     pub what: &'static str,
     /// Lab units; null where it is not known.
     pub lab: Option<f64>,
@@ -69,6 +69,8 @@ const CLUSTERS: &str = "measured: W1 of lightness between pixels and clusters, n
 const UNKNOWN: &str =
     "not known: the paint was not clustered here from pictures, or by an older version";
 const TRANSPORT: &str = "bounded: mean excess of the plans' cost over the dual bound; of several pairs of paints the worst";
+const ANGLES: &str = "measured: W1 of lightness between slices left out and the mixtures in their place, nine of ten of the \
+                      compared slices are within; of several paints the worst";
 const ROUNDING: &str = "bounded: W1 between the boxes and the boxes read back, worst of the slices at the instrument geometries";
 
 /// Error of a paint; nothing is misplaced in a solid color.
@@ -93,14 +95,24 @@ pub fn blend_error(blend: &Blend) -> ResultError {
         !report.without_flakes.contains(&place)
     });
     let worst = report.pairs.iter().map(|pair| pair.mean_gap);
-    ResultError::of(vec![
+    let left_out = blend
+        .clusterings()
+        .filter_map(|clustering| Some(clustering?.left_out_w1?.p90))
+        .reduce(f64::max);
+    let mut terms = vec![
         clusters(with_flakes.map(|(_, clustering)| clustering)),
         Term {
             what: "transport",
             lab: Some(worst.fold(0.0, f64::max)),
             how: TRANSPORT,
         },
-    ])
+    ];
+    terms.extend(left_out.map(|lab| Term {
+        what: "angles",
+        lab: Some(lab),
+        how: ANGLES,
+    }));
+    ResultError::of(terms)
 }
 
 /// Error of a file written from a paint or a blend of this error.

@@ -373,6 +373,6 @@ mod tests {
         let given: Knobs = "clusters=20".parse().expect("knobs");
         let profile = given.over(&file).and_then(|k| k.profile()).expect("knobs");
         assert_eq!(profile.flakes.clusters, 20);
-        assert_eq!(profile.blend.method, Method::Greedy);
+        assert_eq!(profile.flakes.angle_step, 2);
     }
 }

@@ -12,6 +12,7 @@ mod knobs;
 mod profile;
 mod sparkle;
 pub mod study;
+mod thinning;
 mod writing;
 
 pub use clustering::{clustering_error, predicted_clustering_error};
@@ -20,4 +21,5 @@ pub use error::{ResultError, Term, blend_error, file_error, paint_error};
 pub use knobs::{CostKnob, Draw, Knobs, Preset, ProfileError, Transport};
 pub use profile::{PRESETS, Profile};
 pub use sparkle::{Sparkle, sparkle};
+pub use thinning::left_out_w1;
 pub use writing::{WritingError, writing_error};

@@ -171,6 +171,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
         fn every_corner_is_its_weighted_sum(
             count in 1..700_usize, weights in prop::collection::vec(prop::array::uniform3(-40.0..40.0_f64), 2..=5),

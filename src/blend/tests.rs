@@ -177,6 +177,81 @@ fn a_blend_and_its_reverse_are_one() {
     }
 }
 
+fn blend_by(paints: &[&CarPaint], settings: &BlendSettings) -> Blend {
+    let ingredients: Vec<Ingredient<'_>> = paints
+        .iter()
+        .map(|paint| Ingredient { name: "p", paint })
+        .collect();
+    Blend::new(&ingredients, settings, &|_| ()).expect("blends")
+}
+
+/// Sum over all pairs of the mean distances, and the report.
+fn pairwise(blend: &Blend) -> f64 {
+    blend.report().pairs.iter().map(|p| p.mean_cost).sum()
+}
+
+#[test]
+fn the_cheapest_order_is_never_dearer_than_the_canonical_one_and_once_cheaper() {
+    let mut cheaper = 0;
+    for seed in 0..8 {
+        let paints: Vec<CarPaint> = (0..4)
+            .map(|k| paint(100 * seed + k, &[0.0, 20.0], &[0.0]))
+            .collect();
+        let paints: Vec<&CarPaint> = paints.iter().collect();
+        let canonical = blend_by(&paints, &BlendSettings::default());
+        let cheapest = blend_by(
+            &paints,
+            &BlendSettings {
+                order: Order::Cheapest,
+                ..BlendSettings::default()
+            },
+        );
+        let (most, least) = (pairwise(&canonical), pairwise(&cheapest));
+        assert!(least <= most * (1.0 + 1e-12), "{least} {most}");
+        cheaper += usize::from(least < most * (1.0 - 1e-6));
+        assert_eq!(canonical.report().order, [0, 1, 2, 3]);
+        for own in 0..4 {
+            let mut weights = [0.0; 4];
+            weights[own] = 1.0;
+            let alone = at(&cheapest, &weights).flakes.expect("flakes");
+            same_distributions(&alone, paints[own].flakes.as_ref().expect("flakes"));
+        }
+    }
+    assert!(cheaper > 0, "an order never mattered");
+}
+
+#[test]
+fn every_pair_says_how_far_it_is_from_the_best_of_its_own() {
+    let paints: Vec<CarPaint> = (1..4)
+        .map(|seed| paint(seed, &[0.0, 30.0], &[0.0, 20.0]))
+        .collect();
+    let paints: Vec<&CarPaint> = paints.iter().collect();
+    let of = |method| {
+        let settings = BlendSettings {
+            method,
+            ..BlendSettings::default()
+        };
+        (
+            blend_by(&paints[..2], &settings),
+            blend_by(&paints, &settings),
+        )
+    };
+    let (two, three) = of(crate::transport::Method::Exact);
+    let [pair] = &two.report().pairs[..] else {
+        panic!("{:?}", two.report());
+    };
+    assert!(pair.largest_gap <= 1e-6 && pair.checked == 4, "{pair:?}");
+    assert!((pair.mean_cost - two.report().mean_cost).abs() < 1e-5);
+    assert_eq!(three.report().pairs.len(), 3);
+    // Whatever joins three, no pair of them is cheaper than by itself.
+    let alone = &three.report().pairs[0];
+    assert_eq!(alone.paints, [0, 1]);
+    assert!(three.report().pairs.iter().any(|p| p.mean_gap > 1e-3));
+    let (greedy, _) = of(crate::transport::Method::Greedy);
+    let excess = greedy.report().pairs[0].mean_cost - pair.mean_cost;
+    assert!(excess >= -1e-9 && greedy.report().pairs[0].mean_gap >= excess - 1e-9);
+}
+
 #[test]
 fn next_to_weight_one_it_is_the_same_to_a_millionth() {
     let (a, b) = (paint(6, H, D), paint(7, &[0.0, 20.0], D));

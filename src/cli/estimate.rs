@@ -96,7 +96,7 @@ impl Estimate {
             | What::Preview { profile, .. } => profile,
         };
         let options = ReadingArgs::default().options(None, profile)?;
-        let estimate = self.estimate(profile, &options)?;
+        let estimate = self.estimate(profile, &options)?.after(vec![starting()]);
         if as_json {
             let mut told = serde_json::to_value(&estimate).map_err(WorkshopError::internal)?;
             told["estimated_in_seconds"] = json!(begun.elapsed().as_secs_f64());
@@ -196,6 +196,20 @@ impl Estimate {
                 Ok(estimate.after(opened))
             }
         }
+    }
+}
+
+/// What it takes to start this program at all.
+fn starting() -> Stage {
+    let begun = Instant::now();
+    let started = std::env::current_exe().and_then(|program| {
+        std::process::Command::new(program)
+            .arg("--version")
+            .output()
+    });
+    Stage {
+        stage: "start",
+        seconds: started.map_or(0.0, |_| begun.elapsed().as_secs_f64()),
     }
 }
 

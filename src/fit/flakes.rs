@@ -143,6 +143,7 @@ pub fn fit_flakes(
         w1_bound: Some(Percentiles::of(
             fitted.iter().map(|s| s.clusters.w1_bound).collect(),
         )),
+        left_out_w1: None,
         error: None,
     };
     Ok(FittedFlakes {

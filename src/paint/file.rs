@@ -51,6 +51,10 @@ pub struct Clustering {
     /// moving every pixel to a color of its own cluster's box would cost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub w1_bound: Option<Percentiles>,
+    /// Distance W1 of the lightnesses between slices that were left out after the fit and the mixtures that stand in for
+    /// them, Lab units; only of a paint that was thinned for a blend.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_out_w1: Option<Percentiles>,
     /// How far the clusters are from the pixels, where it was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<ClusteringError>,

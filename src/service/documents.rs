@@ -33,6 +33,9 @@ pub struct PaintDocument {
     /// How far the fit is from its measurement, with the floor beside it; null where nothing was fitted.
     #[schema(value_type = Option<Object>)]
     pub residuals: Value,
+    /// How far its flakes are from the pixels they were made of, Lab, with the terms of it and how each is known.
+    #[schema(value_type = Object)]
+    pub error: Value,
     /// How far the paint is from the multi-angle readings that came with its measurement; null where none did.
     #[schema(value_type = Option<Object>)]
     pub multi_angle: Value,
@@ -66,6 +69,9 @@ pub struct BlendDocument {
     /// How good it is: slices, clusters, cost, gap to the dual bound.
     #[schema(value_type = Object)]
     pub correspondence: Value,
+    /// How far its flakes are from the reference, Lab, with the terms of it and how each is known.
+    #[schema(value_type = Object)]
+    pub error: Value,
     /// Common angles and the paints' textures; null when no paint has flakes.
     #[schema(value_type = Option<Object>)]
     pub flakes: Value,

@@ -1,10 +1,10 @@
 //! Blending paints: those with too many clusters are reduced first.
 
 use super::WorkshopError;
-use crate::accuracy::{Profile, blend_deviation};
+use crate::accuracy::{Profile, blend_deviation, left_out_w1};
 use crate::blend::{Blend, BlendError, Ingredient, Origin, Reduction};
 use crate::fit::{ClusterSettings, reduce_clusters};
-use crate::paint::{CarPaint, Flakes, PaintFile};
+use crate::paint::{CarPaint, Clustering, Flakes, PaintFile};
 use crate::transport::TransportError;
 
 /// A new blend and what was done on the way.
@@ -62,7 +62,10 @@ pub fn blend_paints(
     });
     let deviation =
         blend_deviation(&ingredients, &profile.blend).map_err(WorkshopError::internal)?;
-    let clusterings: Vec<_> = paints.iter().map(|file| file.clustering.clone()).collect();
+    let clusterings: Vec<_> = paints
+        .iter()
+        .map(|file| clustering_of(file, &profile.flakes))
+        .collect();
     let blend = blend
         .with_origins(origins)
         .with_accuracy(deviation, &clusterings);
@@ -88,6 +91,20 @@ pub fn blend_paints(
 
 fn widest(paint: &CarPaint) -> usize {
     paint.flakes.as_ref().map_or(0, Flakes::widest_slice)
+}
+
+/// How a paint's flakes were clustered, and what leaving out angles now costs.
+fn clustering_of(file: &PaintFile, wanted: &ClusterSettings) -> Option<Clustering> {
+    let clustering = file.clustering.clone()?;
+    let step = wanted.angle_step / clustering.angle_step.max(1);
+    match &file.paint.flakes {
+        Some(flakes) if step > 1 => Some(Clustering {
+            angle_step: wanted.angle_step,
+            left_out_w1: Some(left_out_w1(flakes, step)),
+            ..clustering
+        }),
+        _ => Some(clustering),
+    }
 }
 
 /// The paint as the profile wants it: with fewer angles if it was fitted at more, and, if it came from a blend and has

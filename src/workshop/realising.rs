@@ -214,6 +214,7 @@ fn paint_file(chosen: &Chosen) -> PaintFile {
         box_rule: "blended".to_owned(),
         angle_step: 1,
         w1_bound: None,
+        left_out_w1: None,
         error: None,
     });
     PaintFile {

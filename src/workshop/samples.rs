@@ -14,7 +14,6 @@ use std::ops::ControlFlow;
 use super::WorkshopError;
 use super::ingest::finish;
 use crate::accuracy::{Profile, clustering_error};
-use crate::color::luminance;
 use crate::fit::{FlakeRecipe, SimulatedPatch, fit_flakes};
 use crate::paint::{CarPaint, Clustering, ColorTable, Lobe, PaintFile, Provenance};
 
@@ -287,12 +286,13 @@ impl Sparkle {
         let color = wide.fold([0.0; 3], |sum, lobe| {
             std::array::from_fn(|c| sum[c] + lobe.weight[c])
         });
-        let bright = luminance(color);
+        // A reflectance is at most 1; how bright the flakes are, their share says.
+        let largest = color.into_iter().fold(0.0, f64::max);
         FlakeRecipe {
             per_mm2: self.per_mm2,
             radius_um: self.radius_um,
             tilt: self.tilt,
-            tint: color.map(|c| c / bright),
+            tint: color.map(|c| c / largest),
             tint_spread: self.tint_spread,
             seed: self.seed,
             ..FlakeRecipe::default()

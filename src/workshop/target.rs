@@ -10,10 +10,8 @@ use super::estimate::{Estimate, Work};
 use super::realising::{choose, error_of};
 use super::{WorkshopError, blend_paints};
 use crate::accuracy::{Profile, blend_error, file_error, writing_error};
-use crate::blend::{BlendSettings, Order};
 use crate::export::{ExportSettings, Precision};
 use crate::fit::ClusterSettings;
-use crate::transport::Method;
 
 /// What a result should keep to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -173,30 +171,19 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
         })
         .collect(),
         Work::BlendNames { .. } | Work::Blend { .. } => {
-            let by = |flakes, method| Profile {
-                flakes,
-                blend: BlendSettings {
-                    method,
-                    ..standard.blend
-                },
+            let by = |clusters| Profile {
+                flakes: clustered(clusters, 1),
                 ..standard
             };
-            let mut ladder = vec![
+            vec![
                 Profile::draft(),
-                by(clustered(24, 1), Method::Greedy),
-                by(clustered(24, 1), Method::Exact),
+                by(12),
+                by(24),
                 standard,
-                by(clustered(100, 1), Method::Exact),
-                by(clustered(200, 1), Method::Exact),
-            ];
-            ladder.push(Profile {
-                blend: BlendSettings {
-                    order: Order::Cheapest,
-                    ..standard.blend
-                },
-                ..ladder[5]
-            });
-            ladder
+                by(100),
+                by(200),
+                Profile::reference(),
+            ]
         }
         Work::Realise { .. } => [Precision::Eight, Precision::F16, Precision::F32]
             .into_iter()

@@ -33,8 +33,10 @@ async fn the_bundle_of_a_blend_is_made_once_and_kept_for_ever() {
         house.count("carpaint_blend_bundles_computed_total").await,
         1.0
     );
-    let draft = house.get(&format!("{address}?profile=draft")).await;
-    assert_eq!(draft.status, 200);
+    let finer = house
+        .get(&format!("{address}?profile=standard,precision=f32"))
+        .await;
+    assert!(finer.status == 200 && finer.body != first.body);
     assert_eq!(
         house.count("carpaint_blend_bundles_computed_total").await,
         2.0

@@ -74,7 +74,7 @@ fn corner_rounding(pixels: &[[f32; 3]]) -> f64 {
 #[test]
 fn a_slice_of_one_color_is_one_point_of_that_color() {
     for color in [[0.2, 0.1, 0.05], [0.0; 3], [1e-6; 3], [30.0, 20.0, 10.0]] {
-        let pixels = [color; 4096];
+        let pixels = vec![color; 4096];
         let found = promised(&pixels, 50, corner_rounding(&pixels));
         assert_eq!(
             (found.probability.as_slice(), &found.lower),
@@ -101,7 +101,7 @@ fn a_slice_of_two_colors_is_two_points_with_their_shares() {
 
 #[test]
 fn all_black_is_one_black_cluster() {
-    let found = promised(&[[0.0; 3]; 4096], 50, 1e-9);
+    let found = promised(&vec![[0.0; 3]; 4096], 50, 1e-9);
     assert_eq!(found.probability, [1.0]);
 }
 

@@ -27,6 +27,8 @@ pub struct Study {
     pub program: String,
     /// Threads that it computed with.
     pub threads: usize,
+    /// What its times are.
+    pub clock: String,
     /// Names of the paints, and how many slices and texels they have.
     pub paints: Vec<String>,
     /// Whether fewer points were measured.

@@ -15,13 +15,13 @@ pub fn page(study: &Study) -> String {
     );
     let _ = write!(
         page,
-        "Measured with carpaint {} on {} threads in {:.0} seconds, with {}. The same for your machine and your paints: \
+        "Measured with carpaint {} on {} threads, with {}. Times are {}, the shortest of several goes. The same for your machine and your paints: \
          `carpaint study --out DIR PAINT...`. Put its `study.json` into the service's data folder, and `GET /v1/accuracy` \
          serves it.\n\n",
         study.program,
         study.threads,
-        study.seconds,
-        list(&study.paints)
+        list(&study.paints),
+        study.clock
     );
     at_a_glance(&mut page, study);
     for front in &study.fronts {
@@ -35,8 +35,7 @@ pub fn page(study: &Study) -> String {
          would have to move to turn one into the other. What each step misplaces is added up: pixels to clusters, \
          detours between paints, rounding in the file.\n\
          - **CIEDE2000** is the color difference of paint tolerances. For pictures it is the mean over all pixels between \
-         the picture and one with 16 times the samples of the finest here, made with the `reference` profile. FLIP (0 to 1) \
-         weighs what is seen when two pictures alternate on a screen.\n\
+         the picture and one of very many samples. FLIP (0 to 1) weighs what is seen when two pictures alternate on a screen.\n\
          - Every result carries its own error: `carpaint show`, `material.json`, the answers of the service. \
          `carpaint estimate` tells seconds, bytes and error beforehand, and `--max-error` or `--max-seconds` picks the \
          profile for you.\n",

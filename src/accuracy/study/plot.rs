@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{Front, Growth, Study};
 
-const WIDTH: f64 = 820.0;
+const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 480.0;
 /// Left, right, top and bottom of the field that is plotted in.
 const FIELD: [f64; 4] = [78.0, 610.0, 56.0, 412.0];
@@ -75,7 +75,7 @@ fn number(value: f64) -> String {
     } else if value >= 1.0 {
         format!("{value:.0}")
     } else {
-        let digits = (-value.log10().floor()).max(1.0);
+        let digits = (-value.log10().floor()).clamp(1.0, 9.0);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few digits
         let digits = digits as usize;
         format!("{value:.digits$}")

@@ -6,7 +6,9 @@ use super::{
     Estimate, EstimatedError, SAMPLED_ANGLES, Stage, extrapolated, left_at, shortest, step_for,
     timed, write_seconds,
 };
-use crate::accuracy::{Profile, clustering_error, paint_error, predicted_clustering_error};
+use crate::accuracy::{
+    Profile, clustering_error, left_out_w1, paint_error, predicted_clustering_error,
+};
 use crate::fit::{ClusterSettings, FittedFlakes, Thinned, fit_flakes};
 use crate::measurement::{FlakePictures, PackageBase};
 use crate::paint::{
@@ -18,7 +20,7 @@ use crate::workshop::thing::{Source, Thing, find, open};
 use crate::workshop::{IngestOptions, Measurement, WorkshopError, open_measurement};
 
 /// Evaluations of a paint that fitting a reflectance table takes as long as.
-const EVALUATIONS_OF_A_FIT: f64 = 1.6e7;
+const EVALUATIONS_OF_A_FIT: f64 = 1.0e7;
 
 /// A paint that may be still to be ingested, with a few of its angles.
 pub(super) struct Sampled {
@@ -143,6 +145,7 @@ pub(super) fn of_paint(paint: PaintFile, profile: &Profile, seconds: f64) -> Sam
             // As many angles as the profile wants: blending is not to thin them again.
             clustering: paint.clustering.clone().map(|c| Clustering {
                 angle_step: c.angle_step.max(profile.flakes.angle_step),
+                left_out_w1: (step > 1).then(|| left_out_w1(flakes, step)),
                 ..c
             }),
             ..paint.clone()

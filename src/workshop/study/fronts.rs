@@ -59,6 +59,22 @@ fn point(of: Setting, seconds: f64, error: f64) -> Point {
     }
 }
 
+/// Threads that parallel work is spread over.
+fn all() -> usize {
+    rayon::current_num_threads()
+}
+
+/// Each profile once, under the first of its labels.
+fn distinct(settings: Vec<Setting>) -> Vec<Setting> {
+    let mut kept: Vec<Setting> = Vec::with_capacity(settings.len());
+    for setting in settings {
+        if kept.iter().all(|other| other.profile != setting.profile) {
+            kept.push(setting);
+        }
+    }
+    kept
+}
+
 fn share(k: usize, of: usize, from: f32, to: f32) -> f32 {
     #[allow(clippy::cast_precision_loss)] // a progress bar
     let done = k as f32 / of.max(1) as f32;
@@ -96,12 +112,13 @@ pub(super) fn ingest(
     }
     let tight = clustered(50, BoxRule::Tight, 1);
     settings.push(setting("tight boxes", "box_rule", with_flakes(tight)));
+    let settings = distinct(settings);
     let (count, goes) = (settings.len(), if options.quick { 1 } else { 2 });
     let mut points = Vec::with_capacity(count);
     for (k, of) in settings.into_iter().enumerate() {
         tell("ingest", share(k, count, 0.0, 0.25));
         let source = &material.sources()[0];
-        let (seconds, paint) = shortest(goes, || source.fit(&of.profile.flakes))?;
+        let (seconds, paint) = shortest(goes, all(), || source.fit(&of.profile.flakes))?;
         let mut worst = paint_error(&paint).lab;
         let mut instrument: f64 = 0.0;
         for file in material.fitted(&of.profile.flakes, 2)? {
@@ -192,6 +209,7 @@ pub(super) fn blend(
             }
         }
     }
+    let settings = distinct(settings);
     let count = settings.len();
     let mut points = Vec::with_capacity(count);
     for (k, of) in settings.into_iter().enumerate() {
@@ -200,7 +218,7 @@ pub(super) fn blend(
         let slow = matches!(of.profile.blend.method, Method::Sinkhorn { .. });
         let goes = if slow || options.quick { 1 } else { 5 };
         let profile = of.profile;
-        let (seconds, made) = shortest(goes, || blend_paints(&paints, &profile, &|_| ()))?;
+        let (seconds, made) = shortest(goes, all(), || blend_paints(&paints, &profile, &|_| ()))?;
         let mut point = point(of, seconds, blend_error(&made.blend).lab);
         let report = made.blend.report();
         let gap = report.pairs.iter().map(|p| p.mean_gap).fold(0.0, f64::max);
@@ -282,6 +300,7 @@ pub(super) fn realise(
             with_flakes(flakes),
         ));
     }
+    let settings = distinct(settings);
     let (count, goes) = (settings.len(), if options.quick { 2 } else { 7 });
     let mut points = Vec::with_capacity(count);
     for (k, of) in settings.into_iter().enumerate() {
@@ -291,7 +310,8 @@ pub(super) fn realise(
         let thing = Thing::Blend(Box::new(blend));
         let (weights, profile) = (even(2), of.profile);
         let go = || realise_to(&thing, Some(&weights), Format::Zip, &profile);
-        let (seconds, made) = shortest(goes, go)?;
+        // One file is written by one thread.
+        let (seconds, made) = shortest(goes, 1, go)?;
         let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
         let mut point = point(of, seconds, number("/accuracy/error/lab").unwrap_or(0.0));
         point.bytes = Some(made.bytes.len() as u64);
@@ -356,6 +376,7 @@ pub(super) fn preview(
         ..Profile::reference()
     };
     let (_, truth) = draw(material, &reference, side, 1, 7)?;
+    let settings = distinct(settings);
     let count = settings.len();
     let mut points = Vec::with_capacity(count);
     for (k, of) in settings.into_iter().enumerate() {
@@ -375,11 +396,15 @@ pub(super) fn preview(
         points.push(point);
     }
     let about = format!("Preview: a ball of {side} x {side} pixels");
+    let error_is = format!(
+        "The error is the mean CIEDE2000 over all pixels from a picture with {finest} samples a pixel by the `reference` \
+         profile. Beside it stand the difference that 95 % of the pixels keep within, and FLIP (0 to 1). Time grows in \
+         proportion to the number of pixels; a website's picture has 16 times as many."
+    );
     Ok(Front::new(
         "preview",
         &about,
-        "The error is the mean CIEDE2000 over all pixels from a picture with many more samples by the reference profile, \
-         which shows the very same flakes. Time is proportional to the number of pixels.",
+        &error_is,
         "CIEDE2000",
         points,
     ))
@@ -401,6 +426,6 @@ fn draw(
         ..Scene::new(Shape::Sphere, [side; 2])
     };
     let go = || render::render(&paint, &scene, &|_| ()).map_err(WorkshopError::internal);
-    let (seconds, rendering) = shortest(goes, go)?;
+    let (seconds, rendering) = shortest(goes, all(), go)?;
     Ok((seconds, rendering.film))
 }

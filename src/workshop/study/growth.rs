@@ -24,17 +24,17 @@ pub(super) fn measure(
     tell("growth with clusters", 0.95);
     let clusters = clusters(material, goes)?;
     tell("growth with paints", 0.97);
-    let paints = paints(material, goes)?;
+    let (whole, paints) = paints(material, goes)?;
     tell("growth with pixels", 0.98);
     let pixels = pixels(material, goes)?;
     tell("growth", 1.0);
-    Ok(vec![slices, texels, clusters, paints, pixels])
+    Ok(vec![slices, texels, clusters, whole, paints, pixels])
 }
 
 fn blend_of(paints: &[PaintFile], goes: usize) -> Result<f64, WorkshopError> {
     let paints: Vec<&PaintFile> = paints.iter().collect();
     let go = || blend_paints(&paints, &Profile::standard(), &|_| ());
-    shortest(goes, go).map(|(seconds, _)| seconds)
+    shortest(goes, rayon::current_num_threads(), go).map(|(seconds, _)| seconds)
 }
 
 /// Blending paints of which every so many-th slice is left: the angles stay spread over the same range.
@@ -75,7 +75,7 @@ fn texels(material: &Material, goes: usize) -> Result<Growth, WorkshopError> {
             .map(|plane| plane.repeat(times));
         let planes = planes.each_ref().map(Vec::as_slice);
         let mut clusterer = Clusterer::default();
-        let (seconds, _) = shortest(goes.max(3), || {
+        let (seconds, _) = shortest(goes.max(5), 1, || {
             clusterer
                 .cluster(planes, &ClusterSettings::default())
                 .map_err(|e| refused(&e))
@@ -96,14 +96,29 @@ fn clusters(material: &mut Material, goes: usize) -> Result<Growth, WorkshopErro
     Ok(Growth::new("clusters", "blending two paints", 1.6, points))
 }
 
-/// Blends of ever more paints, as many as the study has.
-fn paints(material: &mut Material, goes: usize) -> Result<Growth, WorkshopError> {
-    let fits = material.fitted(&Profile::standard().flakes, 5)?.to_vec();
-    let mut points = Vec::new();
-    for count in 2..=fits.len() {
-        points.push([count as f64, blend_of(&fits[..count], goes)?]);
+/// Blends of ever more paints, as many as the study has: from pictures to the blend, and the blend alone.
+fn paints(material: &mut Material, goes: usize) -> Result<(Growth, Growth), WorkshopError> {
+    let standard = Profile::standard().flakes;
+    let fits = material.fitted(&standard, 5)?.to_vec();
+    let (mut ingested, mut whole, mut alone) = (0.0, Vec::new(), Vec::new());
+    for (k, source) in material.sources().iter().take(5).enumerate() {
+        let go = || source.fit(&standard);
+        ingested += shortest(1, rayon::current_num_threads(), go)?.0;
+        if k > 0 {
+            let seconds = blend_of(&fits[..=k], goes)?;
+            alone.push([(k + 1) as f64, seconds]);
+            whole.push([(k + 1) as f64, ingested + seconds]);
+        }
     }
-    Ok(Growth::new("paints", "blending them all", 1.0, points))
+    Ok((
+        Growth::new("paints", "clustering and blending them all", 1.0, whole),
+        Growth::new(
+            "paints, blend alone",
+            "blending them all: each is joined to the clusters of all before it, which add up",
+            1.0,
+            alone,
+        ),
+    ))
 }
 
 fn pixels(material: &mut Material, goes: usize) -> Result<Growth, WorkshopError> {
@@ -111,13 +126,13 @@ fn pixels(material: &mut Material, goes: usize) -> Result<Growth, WorkshopError>
         .paint
         .clone();
     let mut points = Vec::new();
-    for side in [32, 64, 128] {
+    for side in [96, 192, 384] {
         let scene = Scene {
-            samples_per_pixel: 8,
+            samples_per_pixel: 4,
             ..Scene::new(Shape::Sphere, [side; 2])
         };
         let go = || render::render(&paint, &scene, &|_| ()).map_err(WorkshopError::internal);
-        let (seconds, _) = shortest(goes, go)?;
+        let (seconds, _) = shortest(goes, rayon::current_num_threads(), go)?;
         points.push([f64::from(side * side), seconds]);
     }
     Ok(Growth::new("pixels", "drawing a ball", 1.0, points))

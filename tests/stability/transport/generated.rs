@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The 900 slices of `peers/ot/gen.py` in the folder `CARPAINT_DATA`, or `None` where that folder or a Python with NumPy
+/// The 900 slices of `peers/ot/gen.py` in the folder `CARPAINT_DATA`, or `None` where that folder or a Python with `NumPy`
 /// (`CARPAINT_PYTHON`, `python3`) is missing, which is said aloud; with `CI=true` nothing is skipped.
 pub fn slices() -> Option<Vec<Clouds>> {
     let data =

@@ -1,0 +1,82 @@
+//! What a paint loses when every k-th angle of its slices is kept.
+
+use rayon::prelude::*;
+
+use super::geometries::slices_at;
+use crate::paint::{Flakes, LightnessMixture, Percentiles};
+
+/// Most slices that are compared.
+const CHECKED: usize = 64;
+
+/// Distance W1 of the lightnesses between slices that are left out and the mixtures of the kept ones that stand in for
+/// them, Lab units, on at most 64 slices spread evenly over those left out.
+#[must_use]
+pub fn left_out_w1(flakes: &Flakes, step: usize) -> Percentiles {
+    let (rows, columns) = (flakes.theta_h.every(step), flakes.theta_d.every(step));
+    let (kept_h, kept_d) = (flakes.theta_h.at(&rows), flakes.theta_d.at(&columns));
+    let width = flakes.theta_d.len();
+    let left_out: Vec<usize> = (0..flakes.slices())
+        .filter(|k| !rows.contains(&(k / width)) || !columns.contains(&(k % width)))
+        .collect();
+    let stride = left_out.len().div_ceil(CHECKED).max(1);
+    let distances = left_out
+        .into_par_iter()
+        .step_by(stride)
+        .map(|k| {
+            let (h, d) = (
+                flakes.theta_h.degrees()[k / width],
+                flakes.theta_d.degrees()[k % width],
+            );
+            let parts: Vec<_> = slices_at(&kept_h, &kept_d, h, d)
+                .into_iter()
+                .map(|(weight, kept)| {
+                    let (row, column) = (rows[kept / columns.len()], columns[kept % columns.len()]);
+                    (weight, flakes.slice(row, column))
+                })
+                .collect();
+            let own = LightnessMixture::of(&[(1.0, flakes.slice_at(k))]);
+            own.distance(&LightnessMixture::of(&parts))
+        })
+        .collect();
+    Percentiles::of(distances)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paint::{AngleGrid, FlakeTexture};
+
+    /// Five by one slices of one box each, a unit wide, as light as these.
+    fn flakes(lightness: [f32; 5]) -> Flakes {
+        Flakes {
+            theta_h: AngleGrid::new(vec![0.0, 5.0, 10.0, 15.0, 20.0]).expect("ascends"),
+            theta_d: AngleGrid::single(),
+            offsets: vec![0, 1, 2, 3, 4, 5],
+            probability: vec![1.0; 5],
+            lower: lightness.map(|l| [l, 0.0, 0.0]).to_vec(),
+            upper: lightness.map(|l| [l + 1.0, 0.0, 0.0]).to_vec(),
+            texture: FlakeTexture {
+                texel_um: 20.0,
+                grain_um: 15.0,
+                lifetime_deg: [5.0; 2],
+                persistence_deg: [9.0; 2],
+            },
+        }
+    }
+
+    #[test]
+    fn leaving_out_what_its_neighbours_say_costs_nothing() {
+        assert_eq!(left_out_w1(&flakes([30.0; 5]), 2).worst, 0.0);
+        assert_eq!(
+            left_out_w1(&flakes([9.0, 7.0, 5.0, 3.0, 1.0]), 1).worst,
+            0.0
+        );
+    }
+
+    #[test]
+    fn a_slice_between_a_dark_and_a_light_one_is_half_of_either_in_its_place() {
+        // Half of the texels 10 too dark, half 10 too light.
+        let w1 = left_out_w1(&flakes([0.0, 10.0, 20.0, 20.0, 20.0]), 2);
+        assert!((w1.worst - 10.0).abs() < 1e-9 && w1.median < 10.1, "{w1:?}");
+    }
+}
