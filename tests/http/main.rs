@@ -507,7 +507,7 @@ async fn every_refusal_is_a_problem_that_says_where_and_what_instead() {
             b"not a paint".to_vec(),
             422,
             "unusable-measurement",
-            None,
+            Some(""),
         ),
         (
             "POST",
@@ -516,7 +516,7 @@ async fn every_refusal_is_a_problem_that_says_where_and_what_instead() {
             vec![],
             422,
             "unusable-measurement",
-            None,
+            Some(""),
         ),
         (
             "POST",
