@@ -51,9 +51,9 @@ impl Builder {
                 alias: k,
             });
             if share < 1.0 {
-                self.small.push(k)
+                self.small.push(k);
             } else {
-                self.large.push(k)
+                self.large.push(k);
             }
         }
         while let (Some(&low), Some(&high)) = (self.small.last(), self.large.last()) {

@@ -273,7 +273,7 @@ impl<'a> Fitting<'a> {
         match layout {
             Layout::Lobe => bounds.push((0.02, 1.0)),
             Layout::Lacquer => {
-                bounds.extend([(2.0 * lacquer, 1.0), (0.5 * lacquer, 1.01 * lacquer)])
+                bounds.extend([(2.0 * lacquer, 1.0), (0.5 * lacquer, 1.01 * lacquer)]);
             }
             Layout::SecondLobe => bounds.extend([(0.02, 1.0), (0.0, 1.0), (0.02, 0.8)]),
             Layout::Film => bounds.extend([(0.02, 1.0), (0.0, 1.0), (1.1, 3.0), (100.0, 1200.0)]),
@@ -298,7 +298,7 @@ impl<'a> Fitting<'a> {
             Layout::Lobe => {}
             Layout::Lacquer => material.clearcoat_roughness = x[7].sqrt(),
             Layout::SecondLobe => {
-                (material.clearcoat, material.clearcoat_roughness) = (x[7], x[8].sqrt())
+                (material.clearcoat, material.clearcoat_roughness) = (x[7], x[8].sqrt());
             }
             Layout::Film => {
                 (

@@ -33,7 +33,7 @@ pub struct FlakeRecipe {
     pub tilt: f64,
     /// Width w of one flake's reflection as an angle, degrees, 0.5 to 45: how smooth the flakes are.
     pub half_width_deg: f64,
-    /// Color of the metal.
+    /// Color of the metal, 0 to 2: of luminance 1 where it only tints what brightness and depth decide.
     pub tint: LinearRgb,
     /// Standard deviation of the logarithm of a flake's own tint, per channel.
     pub tint_spread: f64,
@@ -128,9 +128,9 @@ impl FlakeRecipe {
             ("texels", f64::from(self.texels), 1.0, 4096.0),
             ("angles", f64::from(self.angles), 1.0, 181.0),
             ("largest_deg", self.largest_deg, 0.0, 85.0),
-            ("tint red", self.tint[0], 0.0, 1.0),
-            ("tint green", self.tint[1], 0.0, 1.0),
-            ("tint blue", self.tint[2], 0.0, 1.0),
+            ("tint red", self.tint[0], 0.0, 2.0),
+            ("tint green", self.tint[1], 0.0, 2.0),
+            ("tint blue", self.tint[2], 0.0, 2.0),
         ];
         for (field, value, low, high) in fields {
             if !(low..=high).contains(&value) {

@@ -9,7 +9,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 rooms="color transport paint blend"
-suites="blends color realisation reflectance transport"
+suites="blends bounds color realisation reflectance transport"
 crate="${CARPAINT_MUTATION:-target/mutation}"
 rm -rf "$crate/src" "$crate/.cargo"
 mkdir -p "$crate/src" "$crate/.cargo"

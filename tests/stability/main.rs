@@ -8,6 +8,7 @@
 //! `CARPAINT_FUZZ` says how many random transport problems are solved; with `CI=true` it is all of them and nothing skips.
 
 mod blends;
+mod bounds;
 mod clusters;
 mod color;
 mod export;

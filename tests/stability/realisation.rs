@@ -127,19 +127,24 @@ fn boxes_that_far_weights_turn_inside_out_are_put_in_order_and_counted() {
     for [w, v] in [[-3.0, 4.0], [4.0, -3.0], [-1.0, -1.0]] {
         let realised = realise(&blend, &[w, v]);
         let got = realised.paint.flakes.as_ref().expect("has flakes");
-        let (mut inverted, mut narrowest) = (0, 0.0_f64);
+        let (mut inverted, mut in_doubt, mut narrowest) = (0, 0, 0.0_f64);
         for k in 0..got.clusters() {
             for axis in 0..3 {
                 let mix = |x: f32, y: f32| w * f64::from(x) + v * f64::from(y);
                 let low = mix(of_a.lower[k][axis], of_b.lower[k][axis]);
                 let high = mix(of_a.upper[k][axis], of_b.upper[k][axis]);
+                // Weights up to 4 are summed in f32: each weight, each product and each of two sums rounds by 2^-24 of
+                // the sum of sizes.
+                let sizes =
+                    (w * f64::from(of_a.upper[k][axis].abs().max(of_a.lower[k][axis].abs()))).abs()
+                        + (v * f64::from(of_b.upper[k][axis].abs().max(of_b.lower[k][axis].abs())))
+                            .abs();
+                let rounding = 4.0 * 2.0_f64.powi(-24) * sizes;
                 inverted += usize::from(high < low);
+                in_doubt += usize::from((high - low).abs() <= 2.0 * rounding);
                 narrowest = narrowest.min(high - low);
-                // The two sums differ from the product's by the order of two terms: an EPS of some hundreds, far
-                // below an ulp of f32, which may then fall on either side.
-                let ulp = f64::from(f32::EPSILON) * low.abs().max(high.abs());
-                assert!((f64::from(got.lower[k][axis]) - low.min(high)).abs() <= ulp);
-                assert!((f64::from(got.upper[k][axis]) - low.max(high)).abs() <= ulp);
+                assert!((f64::from(got.lower[k][axis]) - low.min(high)).abs() <= rounding);
+                assert!((f64::from(got.upper[k][axis]) - low.max(high)).abs() <= rounding);
             }
         }
         let told = realised
@@ -147,14 +152,15 @@ fn boxes_that_far_weights_turn_inside_out_are_put_in_order_and_counted() {
             .iter()
             .find(|c| c.bound.starts_with("inverted"))
             .expect("told");
-        // Widths of exactly 0 are in order; none of these is within rounding of it.
-        assert_eq!(
-            (told.count, told.of),
-            (inverted, 3 * got.clusters()),
-            "{w} {v}"
-        );
+        // A width within rounding of 0 may count as either; hardly one is.
+        assert_eq!(told.of, 3 * got.clusters());
         assert!(
-            inverted > 0 && (told.worst + narrowest).abs() <= 1e-10,
+            told.count.abs_diff(inverted) <= in_doubt && in_doubt < 3,
+            "{w} {v}: {told:?}, {inverted}"
+        );
+        // Corners below 70, weights of 7 in all: 8 roundings of 2^-24 of 500.
+        assert!(
+            inverted > 0 && (told.worst + narrowest).abs() <= 8.0 * 2.0_f64.powi(-24) * 500.0,
             "{told:?} {narrowest}"
         );
     }
@@ -261,8 +267,9 @@ fn each_part_answers_to_its_own_weights_only() {
 /// - what is linear in the weights moves by at most `Σ |Δw_m| · max_m |value_m|`;
 /// - `ln α = Σ w_m ln α_m` where weights sum to 1, so it moves by at most `Σ |Δw_m| · max_m |ln α_m|`;
 /// - ordering corners and holding to bounds are contractions and add nothing;
-/// - boxes are rounded to f32, half an ulp at each end: `2^-24` of their size, twice.
-fn assert_no_jump(x: &CarPaint, y: &CarPaint, ends: &[CarPaint], step: f64) {
+/// - boxes are summed in f32 where weights are moderate: each weight, product and sum rounds by `2^-24` of the sum of sizes,
+///   which is at most `Σ |w_m|` times the largest corner; five roundings at each end.
+fn assert_no_jump(x: &CarPaint, y: &CarPaint, ends: &[CarPaint], step: f64, weights_in_all: f64) {
     let most =
         |get: &dyn Fn(&CarPaint) -> f64| ends.iter().map(get).fold(0.0_f64, |m, v| m.max(v.abs()));
     // Rounding of a sum of three products, and of the two sums' difference.
@@ -318,9 +325,7 @@ fn assert_no_jump(x: &CarPaint, y: &CarPaint, ends: &[CarPaint], step: f64) {
             let size =
                 |f: &carpaint::paint::Flakes| f.lower[k][axis].abs().max(f.upper[k][axis].abs());
             let reach = f64::from(ends.iter().map(size).fold(0.0, f32::max));
-            let held = f64::from(size(&fx).max(size(&fy)));
-            let accepted =
-                step * reach + 2.0 * held * f64::from(f32::EPSILON) / 2.0 + rounding * reach * 8.0;
+            let accepted = (step + 10.0 * 2.0_f64.powi(-24) * weights_in_all) * reach;
             for (p, q) in [
                 (fx.lower[k][axis], fy.lower[k][axis]),
                 (fx.upper[k][axis], fy.upper[k][axis]),
@@ -365,7 +370,9 @@ fn ten_thousand_steps_of_the_weights_never_make_a_parameter_jump() {
             (0..3).map(|m| (next[m] - weights[m]).abs()).sum::<f64>() + 16.0 * f64::EPSILON;
         let realised = realise(&blend, &next);
         inverted += usize::from(!realised.clamps.is_empty());
-        assert_no_jump(&realised.paint, &paint, &ends, step);
+        let in_all = |w: &[f64; 3]| w.iter().map(|v| v.abs()).sum::<f64>();
+        let weights_in_all = in_all(&next).max(in_all(&weights));
+        assert_no_jump(&realised.paint, &paint, &ends, step, weights_in_all);
         (weights, paint) = (next, realised.paint);
     }
     assert!(

@@ -172,8 +172,8 @@ pub(super) fn steps(subject: &Subject<'_>) -> Vec<Check> {
         let after = corners(at(&blend, [1.0 - next, next]));
         let step = 2.0 * (next - t).abs();
         for (k, (x, y)) in after.iter().zip(&before).enumerate() {
-            let rounding = f64::from(f32::EPSILON) * x.abs().max(y.abs()) + 1e-30;
-            let bound = step * reach(k) + rounding + 1e-12 * reach(k);
+            // Boxes are summed in f32: five roundings a sum of Σ|w| ≤ 3 times the largest corner, at both ends.
+            let bound = (step + 10.0 * 3.0 * f64::from(f32::EPSILON) / 2.0) * reach(k) + 1e-30;
             worst = worst.max((x - y).abs() / bound);
         }
         (t, before) = (next, after);
