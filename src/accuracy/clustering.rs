@@ -88,11 +88,11 @@ pub fn predicted_clustering_error(
 /// The slices of a fit, by number.
 type Fitted<'a> = dyn Fn(usize) -> Option<Slice<'a>> + Sync + 'a;
 
-fn compared<'a>(
+fn compared(
     pictures: &dyn FlakePictures,
     paint: &CarPaint,
     grid: [&AngleGrid; 2],
-    fitted: &Fitted<'a>,
+    fitted: &Fitted<'_>,
 ) -> ClusteringError {
     let seen = geometries(paint);
     let slices = slices_to_compare(pictures, &seen);
@@ -158,12 +158,12 @@ fn slices_to_compare(pictures: &dyn FlakePictures, seen: &[Geometry]) -> Vec<usi
     slices
 }
 
-fn compare<'a>(
+fn compare(
     pictures: &dyn FlakePictures,
     slice: usize,
     room: &SliceRoom,
     [theta_h, theta_d]: [&AngleGrid; 2],
-    fitted: &Fitted<'a>,
+    fitted: &Fitted<'_>,
 ) -> Option<Compared> {
     let [red, green, blue] = room.picture.planes.each_ref();
     let (mut lightness, mut sum) = (Vec::with_capacity(red.len()), [0.0; 3]);

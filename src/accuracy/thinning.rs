@@ -75,8 +75,8 @@ mod tests {
 
     #[test]
     fn a_slice_between_a_dark_and_a_light_one_is_half_of_either_in_its_place() {
-        // Half of the texels 10 too dark, half 10 too light.
+        // The darker half of 10..11, at 10.25 in the mean, goes to 0..1; the lighter to 20..21.
         let w1 = left_out_w1(&flakes([0.0, 10.0, 20.0, 20.0, 20.0]), 2);
-        assert!((w1.worst - 10.0).abs() < 1e-9 && w1.median < 10.1, "{w1:?}");
+        assert!((w1.worst - 9.75).abs() < 1e-6, "{w1:?}");
     }
 }

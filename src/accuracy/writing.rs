@@ -23,6 +23,9 @@ pub struct WritingError {
     pub inverse_cdf_loss: Option<f64>,
 }
 
+/// Corners of smallest and largest L, a, b of some boxes.
+type Corners = (Vec<[f32; 3]>, Vec<[f32; 3]>);
+
 /// What writing a paint with these settings loses. `None` for a solid color.
 #[must_use]
 pub fn writing_error(paint: &CarPaint, settings: &ExportSettings) -> Option<WritingError> {
@@ -34,7 +37,7 @@ pub fn writing_error(paint: &CarPaint, settings: &ExportSettings) -> Option<Writ
         let met = geometry.slices(&flakes.theta_h, &flakes.theta_d);
         let slices: Vec<(f64, Slice<'_>)> =
             met.iter().map(|&(w, k)| (w, flakes.slice_at(k))).collect();
-        let written: Vec<(Vec<[f32; 3]>, Vec<[f32; 3]>)> = slices
+        let written: Vec<Corners> = slices
             .iter()
             .map(|(_, slice)| {
                 let back = |c: &[[f32; 3]]| c.iter().map(|&c| rounding.read_back(c)).collect();

@@ -43,6 +43,7 @@ struct Common {
     /// Print one JSON object on stdout; progress and errors stay on stderr.
     #[arg(long, global = true)]
     json: bool,
+    #[allow(clippy::doc_markdown)] // a help text, printed as it stands
     /// Threads to compute with, in place of RAYON_NUM_THREADS, in place of all. Results are the same with any number.
     #[arg(long, global = true, value_name = "N")]
     threads: Option<usize>,

@@ -14,6 +14,7 @@ pub struct ProfileArgs {
     /// Accuracy profile: draft, standard, reference, or a JSON file of knobs.
     #[arg(long, value_name = "NAME|FILE.json", default_value = "standard")]
     pub profile: String,
+    #[allow(clippy::doc_markdown)] // a help text, printed as it stands
     /// Turn one knob of the profile, such as clusters=100; may be repeated. Knobs: clusters, box_rule, angle_step,
     /// transport, epsilon, cost, order, precision, draw, samples_per_pixel.
     #[arg(long = "knob", value_name = "NAME=VALUE")]

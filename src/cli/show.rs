@@ -1,5 +1,7 @@
 //! `carpaint show`: everything known about a paint or a blend.
 
+use std::fmt::Write as _;
+
 use clap::Args;
 use serde_json::Value;
 
@@ -77,15 +79,15 @@ fn tree(value: &Value, depth: usize, text: &mut String) {
         Value::Object(map) => map.iter().map(|(key, v)| (format!("{key}:"), v)).collect(),
         Value::Array(list) => list.iter().map(|v| ("-".to_owned(), v)).collect(),
         other => {
-            *text += &format!("{pad}{}\n", inline(other).unwrap_or_default());
+            let _ = writeln!(text, "{pad}{}", inline(other).unwrap_or_default());
             return;
         }
     };
     for (key, value) in entries {
         if let Some(line) = inline(value) {
-            *text += &format!("{pad}{key} {line}\n");
+            let _ = writeln!(text, "{pad}{key} {line}");
         } else {
-            *text += &format!("{pad}{key}\n");
+            let _ = writeln!(text, "{pad}{key}");
             tree(value, depth + 1, text);
         }
     }

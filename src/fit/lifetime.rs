@@ -89,9 +89,9 @@ pub(super) fn lifetime(
     for _ in 0..100 {
         let middle = (low * high).sqrt();
         if drawn_fall(middle) < crossing {
-            low = middle
+            low = middle;
         } else {
-            high = middle
+            high = middle;
         }
     }
     Lifetime {

@@ -204,6 +204,7 @@ impl<'a> Shader<'a> {
     }
 
     /// Light that leaves the points of a batch, summed.
+    #[allow(clippy::too_many_lines)] // one loop over the lanes: what it holds in registers must not cross a call
     fn leaving<const COATED: bool, const FLAKES: bool>(
         &self,
         batch: &Batch,

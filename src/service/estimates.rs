@@ -129,13 +129,13 @@ pub async fn create(
     });
     let (estimate, met) = estimated.await?.map_err(WorkError::of_body)?;
     Ok(Answer::json(
-        &EstimateDocument::of(estimate, met),
+        &EstimateDocument::of(&estimate, met),
         Keep::Never,
     ))
 }
 
 impl EstimateDocument {
-    fn of(estimate: Estimate, met: Option<bool>) -> Self {
+    fn of(estimate: &Estimate, met: Option<bool>) -> Self {
         Self {
             profile: estimate.profile,
             knobs: estimate.knobs,

@@ -10,6 +10,7 @@ use serde::de::DeserializeOwned;
 use super::app::App;
 use super::problem::{Kind, Problem};
 use super::query;
+use crate::workshop::accepted;
 
 /// Most bytes of a JSON body; the router holds bodies to it.
 pub const JSON_BYTES: usize = 64 << 10;
@@ -115,8 +116,12 @@ fn expected(message: &str) -> Option<String> {
             .split_once('`')
             .map(|(name, _)| format!("an object with the field {name}"));
     }
-    let (_, rest) = message.rsplit_once(", expected ")?;
-    let rest = rest.split_once(" at line ").map_or(rest, |(what, _)| what);
+    let message = message
+        .rsplit_once(" at line ")
+        .map_or(message, |(what, _)| what);
+    let Some((_, rest)) = message.rsplit_once(", expected ") else {
+        return accepted(message).map(str::to_owned);
+    };
     let what = rest.strip_prefix("one of ").unwrap_or(rest);
     Some(match what {
         "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0".to_owned(),

@@ -18,7 +18,7 @@ use super::documents::{PaintDocument, PaintList, PaintSummary};
 use super::extract::{Address, NoQuery, Query};
 use super::idempotency::Idempotency;
 use super::ids;
-use super::problem::{Kind, Problem, ProblemDocument};
+use super::problem::{Kind, Place, Problem, ProblemDocument};
 use super::profile::ProfileText;
 use super::runner::{self, Ended, JobDocument, UnderWay};
 use super::targets;
@@ -402,6 +402,7 @@ async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Problem> 
     }
     if length == 0 {
         return Err(Problem::new(Kind::UnusableMeasurement, "The body is empty.")
+            .at(Place::Body, "")
             .accepting("a measured-paint package, an RGL .bsdf, an MPI 2005 table, a MERL binary or a .paint"));
     }
     Ok(writer)

@@ -364,7 +364,7 @@ impl PreviewOrder {
         app: &App,
     ) -> Result<(Arc<Shelved>, Option<RealisationWeights>), Problem> {
         let missing = |field: &str, problem: Problem| match problem.kind() {
-            Kind::UnknownPaint | Kind::UnknownBlend => problem.as_value(field),
+            Kind::UnknownPaint | Kind::UnknownBlend => problem.naming_value(field),
             _ => problem,
         };
         match (&self.paint, &self.blend) {

@@ -313,7 +313,7 @@ impl Problem {
 
     /// The same problem of what a value in the body names.
     #[must_use]
-    pub fn as_value(self, field: &str) -> Self {
+    pub fn naming_value(self, field: &str) -> Self {
         Self {
             kind: Kind::InvalidValue,
             field: Some((Place::Body, format!("/{field}"))),

@@ -105,6 +105,7 @@ fn names(page: &PaintPage) -> Vec<&str> {
 }
 
 /// What [`Paints`] and [`Blends`] promise, on an empty catalogue.
+#[allow(clippy::too_many_lines)] // one story, told in its order
 async fn records_conform(catalogue: &dyn Catalogue) {
     let upload = Hash::of(b"upload");
     for (id, name) in [

@@ -15,6 +15,7 @@ use serde_json::Value;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
+#[allow(clippy::too_many_lines)] // a list of requests
 fn main() -> Outcome<()> {
     let packages: Vec<String> = std::env::args().skip(1).collect();
     let folder = tempfile::tempdir()?;

@@ -14,7 +14,7 @@ fn cluster_by(pixels: &[[f32; 3]], settings: ClusterSettings) -> Result<SliceClu
 fn cluster(pixels: &[[f32; 3]]) -> SliceClusters {
     let clusters = cluster_by(pixels, ClusterSettings::default()).expect("has texels");
     let n = clusters.probability.len();
-    assert!(n >= 1 && n <= 50 && clusters.lower.len() == n && clusters.upper.len() == n);
+    assert!((1..=50).contains(&n) && clusters.lower.len() == n && clusters.upper.len() == n);
     let sum: f64 = clusters.probability.iter().sum();
     assert!((sum - 1.0).abs() <= f64::EPSILON * n as f64, "{sum}");
     for (lower, upper) in clusters.lower.iter().zip(&clusters.upper) {
@@ -178,7 +178,7 @@ fn the_variance_in_lab_is_kept() {
 
 #[test]
 fn one_color_is_one_cluster_and_two_are_two() {
-    let one = cluster(&[[0.2, 0.1, 0.05]; 4096]);
+    let one = cluster(&vec![[0.2, 0.1, 0.05]; 4096]);
     assert_eq!(
         (one.probability.as_slice(), &one.lower),
         (&[1.0][..], &one.upper)
@@ -200,7 +200,7 @@ fn one_color_is_one_cluster_and_two_are_two() {
 
 #[test]
 fn black_is_black_and_noise_around_it_keeps_its_mean() {
-    let black = cluster(&[[0.0; 3]; 4096]);
+    let black = cluster(&vec![[0.0; 3]; 4096]);
     assert_eq!(black.probability, [1.0]);
     assert!(slice(&black).mean().iter().all(|v| v.abs() < 1e-9));
     let noise: Vec<[f32; 3]> = (0..4096)

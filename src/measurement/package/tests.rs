@@ -368,7 +368,7 @@ fn limits_hold_for_what_an_archive_unpacks_to() {
         .map(|_| ())
         .expect_err("too many")
         .to_string();
-    assert!(text.contains("6 files") && text.contains("5"), "{text}");
+    assert!(text.contains("6 files") && text.contains('5'), "{text}");
     // A bomb: a color table's name on sixteen megabytes of zeros.
     let bomb = zipped(
         &with_file("color_table.exr", Some(vec![0; 16 << 20])),

@@ -18,7 +18,7 @@ use crate::store::whole_file::{Durability, appear};
 const HASH_BYTES: usize = 32;
 
 /// Where results are written before they appear.
-const INCOMING: &str = "incoming";
+pub(super) const INCOMING: &str = "incoming";
 
 #[derive(Debug)]
 pub(super) struct ResultFolder {

@@ -78,7 +78,8 @@ async fn an_error_reaches_all_who_wait_and_is_not_kept() {
 async fn kept(folder: &Path) -> PathBufs {
     for _ in 0..500 {
         let files = files(folder);
-        if !files.is_empty() && files.iter().all(|path| path.parent() != Some(folder)) {
+        let incoming = folder.join(disk::INCOMING);
+        if !files.is_empty() && files.iter().all(|path| path.parent() != Some(&incoming)) {
             return files;
         }
         tokio::time::sleep(Duration::from_millis(10)).await;
@@ -93,9 +94,9 @@ fn files(folder: &Path) -> PathBufs {
     for item in std::fs::read_dir(folder).expect("a folder") {
         let path = item.expect("an entry").path();
         if path.is_dir() {
-            all.extend(files(&path))
+            all.extend(files(&path));
         } else {
-            all.push(path)
+            all.push(path);
         }
     }
     all

@@ -142,6 +142,8 @@ fn extrapolated(small: (f64, f64), large: (f64, f64), size: f64) -> f64 {
 /// Seconds that writing a file of this size durably takes, by writing a small and a larger one.
 fn write_seconds(bytes: f64) -> f64 {
     use std::io::Write as _;
+    const SMALL: u16 = 1 << 12;
+    const LARGE: u32 = 1 << 20;
     let write = |length: usize| {
         let content = vec![0x5a_u8; length];
         shortest(|| -> std::io::Result<()> {
@@ -151,8 +153,6 @@ fn write_seconds(bytes: f64) -> f64 {
         })
         .0
     };
-    const SMALL: u16 = 1 << 12;
-    const LARGE: u32 = 1 << 20;
     extrapolated(
         (f64::from(SMALL), write(usize::from(SMALL))),
         (f64::from(LARGE), write(LARGE as usize)),

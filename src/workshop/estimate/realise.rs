@@ -3,7 +3,7 @@
 use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, step_for, write_seconds};
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
-use crate::paint::{CarPaint, PaintFile};
+use crate::paint::{CarPaint, Flakes, PaintFile};
 use crate::workshop::realising::{Format, realise};
 use crate::workshop::{Thing, WorkshopError};
 
@@ -56,7 +56,7 @@ pub fn estimate_realise(
 
 fn slices(thing: &Thing) -> f64 {
     let count = match thing {
-        Thing::Paint(file) => file.paint.flakes.as_ref().map_or(1, |f| f.slices()),
+        Thing::Paint(file) => file.paint.flakes.as_ref().map_or(1, Flakes::slices),
         Thing::Blend(blend) => blend.angles().map_or(1, |[h, d]| h * d),
     };
     count as f64
