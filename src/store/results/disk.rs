@@ -25,7 +25,7 @@ pub(super) struct ResultFolder {
     folder: PathBuf,
     limit: u64,
     held: AtomicU64,
-    sweeping: tokio::sync::Mutex<()>,
+    sweeping: tokio::sync::RwLock<()>,
 }
 
 struct Entry {
@@ -52,7 +52,7 @@ impl ResultFolder {
             folder: folder.to_owned(),
             limit,
             held: AtomicU64::new(held),
-            sweeping: tokio::sync::Mutex::default(),
+            sweeping: tokio::sync::RwLock::default(),
         })
     }
 
@@ -98,6 +98,7 @@ impl ResultFolder {
             return;
         }
         let (folder, place) = (self.folder.join(INCOMING), self.place(key));
+        let writing = self.sweeping.read().await;
         let written = spawn_blocking(move || -> io::Result<()> {
             let mut file = NamedTempFile::new_in(folder)?;
             file.write_all(result.hash.as_bytes())?;
@@ -106,7 +107,9 @@ impl ResultFolder {
         });
         match written.await {
             Ok(Ok(())) => {
-                if self.held.fetch_add(length, Ordering::Relaxed) + length > self.limit {
+                let held = self.held.fetch_add(length, Ordering::Relaxed) + length;
+                drop(writing);
+                if held > self.limit {
                     self.sweep().await;
                 }
             }
@@ -117,10 +120,11 @@ impl ResultFolder {
 
     /// Drops what was not used for longest, until a tenth of the space is free.
     async fn sweep(&self) {
-        // One at a time; who comes meanwhile finds the room made.
-        let Ok(_sweeping) = self.sweeping.try_lock() else {
+        // Alone: what is written while the folder is read would be neither found nor counted.
+        let _alone = self.sweeping.write().await;
+        if self.held.load(Ordering::Relaxed) <= self.limit {
             return;
-        };
+        }
         let (folder, goal) = (self.folder.clone(), self.limit / 10 * 9);
         let swept = spawn_blocking(move || -> io::Result<u64> {
             let mut entries = entries(&folder)?;
