@@ -48,35 +48,35 @@ fn set_node(paint: &mut CarPaint, value: f64) {
 
 const NUMBERS: [Bounded; 15] = [
     ("coat.ior", 1.0, 4.0, |p, v| {
-        p.coat.as_mut().expect("coated").ior = v
+        p.coat.as_mut().expect("coated").ior = v;
     }),
     ("coat.roughness", 0.0, 1.0, |p, v| {
-        p.coat.as_mut().expect("coated").roughness = v
+        p.coat.as_mut().expect("coated").roughness = v;
     }),
     ("coat.thickness_um", 0.0, 1e6, |p, v| {
-        p.coat.as_mut().expect("coated").thickness_um = Some(v)
+        p.coat.as_mut().expect("coated").thickness_um = Some(v);
     }),
     ("diffuse[2]", 0.0, 1e3, |p, v| p.diffuse[2] = v),
     ("lobes[1].weight[0]", 0.0, 1e3, |p, v| {
-        p.lobes[1].weight[0] = v
+        p.lobes[1].weight[0] = v;
     }),
     ("lobes[2].alpha", f64::MIN_POSITIVE, 10.0, |p, v| {
-        p.lobes[2].alpha = v
+        p.lobes[2].alpha = v;
     }),
     ("lobes[0].f0", 0.0, 1.0, |p, v| p.lobes[0].f0 = v),
     ("color_table[3]", -2000.0, 2000.0, set_node),
     ("color_table.overall", -2000.0, 2000.0, set_overall),
     ("flakes.texel_um", f64::MIN_POSITIVE, 1e5, |p, v| {
-        flakes(p).texture.texel_um = v
+        flakes(p).texture.texel_um = v;
     }),
     ("flakes.grain_um", f64::MIN_POSITIVE, 1e6, |p, v| {
-        flakes(p).texture.grain_um = v
+        flakes(p).texture.grain_um = v;
     }),
     ("flakes.lifetime_deg", f64::MIN_POSITIVE, 1e4, |p, v| {
-        flakes(p).texture.lifetime_deg[1] = v
+        flakes(p).texture.lifetime_deg[1] = v;
     }),
     ("flakes.lifetime_deg", f64::MIN_POSITIVE, 1e4, |p, v| {
-        flakes(p).texture.persistence_deg[0] = v
+        flakes(p).texture.persistence_deg[0] = v;
     }),
     ("flakes.slices[1].box[2][0]", -2000.0, 2000.0, |p, v| {
         // Both corners, in order: the box is a point at the value, as near as f32 has it.
