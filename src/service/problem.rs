@@ -296,17 +296,12 @@ impl Problem {
         self
     }
 
-    /// The same problem where parameters stand in the body; a field of one name has another there.
+    /// The same problem where parameters stand in the body.
     #[must_use]
-    pub fn in_body(mut self, from: &str, to: &str) -> Self {
+    pub fn in_body(mut self) -> Self {
         if self.kind == Kind::InvalidParameter {
             self.kind = Kind::InvalidValue;
-            let pointer = self.field.map_or(String::new(), |(_, pointer)| pointer);
-            let named = pointer.strip_prefix('/').filter(|name| *name == from);
-            self.field = Some((
-                Place::Body,
-                named.map_or(pointer.clone(), |_| format!("/{to}")),
-            ));
+            self.field = self.field.map(|(_, pointer)| (Place::Body, pointer));
         }
         self
     }

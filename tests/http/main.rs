@@ -5,6 +5,7 @@
 
 mod bundle;
 mod client;
+mod fields;
 mod house;
 mod kill;
 mod real;
