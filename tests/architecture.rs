@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 /// Rooms that compute a paint's way through the house, from measurement to picture.
 const COMPUTING: &[&str] = &[
     "color",
+    "descent",
     "transport",
     "paint",
     "measurement",
@@ -23,12 +24,14 @@ const COMPUTING: &[&str] = &[
 const MAY_USE: &[(&str, &[&[&str]])] = &[
     ("color", &[]),
     ("transport", &[]),
+    // What two searches of different rooms share, as numbers only.
+    ("descent", &[]),
     ("paint", &[&["color"]]),
     ("measurement", &[&["color", "paint"]]),
-    ("fit", &[&["measurement", "paint", "color"]]),
+    ("fit", &[&["measurement", "paint", "color", "descent"]]),
     ("blend", &[&["paint", "transport", "color"]]),
     ("render", &[&["paint", "color"]]),
-    ("export", &[&["paint", "blend", "color"]]),
+    ("export", &[&["paint", "blend", "color", "descent"]]),
     // Profiles are the rooms' settings together, so accuracy sees every room below it.
     ("accuracy", &[COMPUTING]),
     ("store", &[]),

@@ -43,7 +43,7 @@ pub use noise::SamplingError;
 pub use scene::{Background, Camera, DirectionalLight, Scene};
 pub use surface::Shape;
 pub use texels::texels;
-pub use tone::{encode_srgb, neutral};
+pub use tone::neutral;
 
 use crate::paint::{CarPaint, Limits};
 
