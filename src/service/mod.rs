@@ -49,7 +49,7 @@ pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
     Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
-    Progress, Scene, Target, ThetaH, Thing, View, WorkError, Works,
+    Progress, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 
