@@ -29,6 +29,7 @@ mod previews;
 mod problem;
 mod profile;
 mod query;
+mod readings;
 mod realisations;
 mod runner;
 mod samples;
@@ -48,7 +49,7 @@ pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
     Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
-    Progress, Scene, Target, ThetaH, Thing, View, WorkError, Works,
+    Progress, Readings, Scene, Target, ThetaH, Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 
