@@ -11,6 +11,7 @@ use super::extract::{Address, Query};
 use super::ids;
 use super::problem::{Problem, ProblemDocument};
 use super::realisations::ProfileQuery;
+use super::targets;
 use super::works::WorkError;
 
 /// All paints of a blend in one archive.
@@ -34,7 +35,16 @@ pub async fn bundle(
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let blend = app.blend(&id).await?;
-    let profile = query.profile.unwrap_or_default().of_query()?;
+    if targets::of_query(query.max_error, query.max_seconds, query.profile.is_some())?.is_some() {
+        return Err(Problem::parameter(
+            "max_error",
+            "No profile is picked for the bundle of a whole blend.",
+        )
+        .accepting("profile, in place of max_error and max_seconds"));
+    }
+    let asked = query.profile.unwrap_or_default();
+    asked.fits(&blend)?;
+    let profile = asked.of_query()?;
     let key = ids::key(
         "blend_bundle",
         &(&blend.id, blend.file.to_string(), profile.export),
