@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use clap::Args;
 
+use super::number::finite;
 use crate::blend::RealisationWeights;
 use crate::workshop::{Thing, WorkshopError};
 
@@ -18,8 +19,8 @@ impl FromStr for WeightList {
         text.split(',')
             .enumerate()
             .map(|(k, word)| {
-                word.trim().parse::<f64>().map_err(|_| {
-                    format!("number {} is '{word}'; accepted are numbers separated by commas, such as 0.3,0.7", k + 1)
+                finite(word.trim()).map_err(|_| {
+                    format!("number {} is '{word}'; accepted are finite numbers separated by commas, such as 0.3,0.7", k + 1)
                 })
             })
             .collect::<Result<_, _>>()
@@ -43,7 +44,7 @@ pub struct WeightArgs {
     #[arg(long, value_name = "W", allow_hyphen_values = true)]
     pub flake_color: Option<WeightList>,
     /// Factor on the flakes' a and b: 0 makes them white.
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    #[arg(long, value_name = "S", value_parser = finite, allow_hyphen_values = true)]
     pub flake_saturation: Option<f64>,
 }
 

@@ -8,6 +8,7 @@
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
 //! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`).
 
+mod accepted;
 mod accuracy;
 mod answer;
 mod app;

@@ -304,16 +304,12 @@ impl Problem {
         self
     }
 
-    /// The same problem where parameters stand in the body; a field of one name has another there.
+    /// The same problem where parameters stand in the body.
     #[must_use]
-    pub fn in_body(mut self, names: &[(&str, &str)]) -> Self {
+    pub fn in_body(mut self) -> Self {
         if self.kind == Kind::InvalidParameter {
             self.kind = Kind::InvalidValue;
-            let pointer = self.field.map_or(String::new(), |(_, pointer)| pointer);
-            let parameter = pointer.strip_prefix('/');
-            let other = names.iter().find(|(name, _)| parameter == Some(*name));
-            let pointer = other.map_or(pointer.clone(), |(_, field)| format!("/{field}"));
-            self.field = Some((Place::Body, pointer));
+            self.field = self.field.map(|(_, pointer)| (Place::Body, pointer));
         }
         self
     }

@@ -24,7 +24,7 @@ use crate::blend::RealisationWeights;
 pub struct ProfileQuery {
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,precision=f32,draw=alias`.
     #[param(value_type = Option<String>, example = "standard")]
-    pub(super) profile: Option<ProfileText>,
+    profile: Option<ProfileText>,
     /// In place of a profile: the cheapest whose error is at most this, Lab.
     #[param(exclusive_minimum = 0.0)]
     pub(super) max_error: Option<f64>,

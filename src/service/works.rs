@@ -103,9 +103,11 @@ pub enum Scene {
 #[serde(deny_unknown_fields)]
 pub struct Light {
     /// Towards the light, of any length: x to the right, y up, z towards the viewer.
+    #[schema(min_items = 3, max_items = 3)]
     pub towards: [f32; 3],
     /// Irradiance on a surface that faces it, linear sRGB; that of the scene's usual light unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 3, max_items = 3)]
     pub irradiance: Option<[f32; 3]>,
 }
 

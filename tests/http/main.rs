@@ -5,6 +5,7 @@
 
 mod bundle;
 mod client;
+mod fields;
 mod house;
 mod kill;
 mod readings;
@@ -592,7 +593,7 @@ async fn every_refusal_is_a_problem_that_says_where_and_what_instead() {
             b"{".to_vec(),
             400,
             "malformed-request",
-            None,
+            Some(""),
         ),
         (
             "POST",
@@ -1286,7 +1287,7 @@ async fn a_picture_has_its_report_beside_it_and_a_whole_scene_is_posted() {
         (json!({"paint": a, "size": [0, 9]}), "/size"),
         (
             json!({"paint": a, "lights": [{"towards": [0, 0, 0]}]}),
-            "/lights",
+            "/lights/0",
         ),
         (json!({"paint": a, "format": "gif"}), "/format"),
         (json!({"paint": a, "profile": "best"}), "/profile"),

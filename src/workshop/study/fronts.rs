@@ -11,7 +11,7 @@ use crate::accuracy::{PRESETS, Profile, blend_error, paint_error};
 use crate::blend::{BlendSettings, RealisationWeights};
 use crate::export::{ExportSettings, Precision};
 use crate::fit::{BoxRule, ClusterSettings};
-use crate::paint::PaintFile;
+use crate::paint::{Limits, PaintFile};
 use crate::render::{self, Film, Scene, Shape};
 use crate::transport::{Cost, Method};
 use crate::workshop::realising::realise as realise_to;
@@ -425,7 +425,9 @@ fn draw(
         seed,
         ..Scene::new(Shape::Sphere, [side; 2])
     };
-    let go = || render::render(&paint, &scene, &|_| ()).map_err(WorkshopError::internal);
+    let go = || {
+        render::render(&paint, &scene, &Limits::default(), &|_| ()).map_err(WorkshopError::internal)
+    };
     let (seconds, rendering) = shortest(goes, all(), go)?;
     Ok((seconds, rendering.film))
 }
