@@ -34,6 +34,7 @@ pub struct Blend {
 
 impl Blend {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        output::check_ending(&self.out, "blend")?;
         let mut options = ReadingArgs::default().options(None, &self.target.profile)?;
         if !PAINTS.contains(&self.inputs.len()) {
             let problem = format!(

@@ -100,6 +100,7 @@ impl ReadingArgs {
 
 impl Ingest {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        output::check_ending(&self.out, "paint")?;
         let mut options = self
             .reading
             .options(self.name.clone(), &self.target.profile)?;

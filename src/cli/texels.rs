@@ -49,6 +49,7 @@ pub struct Texels {
 
 impl Texels {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        output::check_ending(&self.out, "exr")?;
         let options = ReadingArgs::default().options(None, &self.profile)?;
         let progress = Progress::reading(&self.input);
         let thing = open(&self.input, &options, &|share| progress.at(share))?;

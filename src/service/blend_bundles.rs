@@ -45,7 +45,9 @@ pub async fn bundle(
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let blend = app.blend(&id).await?;
-    let profile = query.profile.unwrap_or_default().of_query()?;
+    let asked = query.profile.unwrap_or_default();
+    asked.fits(&blend)?;
+    let profile = asked.of_query()?;
     let key = ids::key(
         "blend_bundle",
         &(&blend.id, blend.file.to_string(), profile.export),

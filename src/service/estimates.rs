@@ -229,6 +229,10 @@ impl EstimateOrder {
             }
             WorkName::Realise | WorkName::Preview => match (&self.paint, &self.blend) {
                 (Some(id), None) => {
+                    if self.weights.is_some() {
+                        let problem = Problem::value("/weights", "One paint takes no weights.");
+                        return Err(problem.accepting("nothing"));
+                    }
                     let paint = of_field(app.paint(id).await, "/paint")?;
                     Ok(Needed::Thing(paint, None))
                 }

@@ -30,6 +30,7 @@ mod previews;
 mod problem;
 mod profile;
 mod query;
+mod readings;
 mod realisations;
 mod runner;
 mod samples;
@@ -49,7 +50,7 @@ pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
     Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
-    Progress, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
+    Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 

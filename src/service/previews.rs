@@ -127,6 +127,9 @@ impl ViewQuery {
         weights: Option<&RealisationWeights>,
         format: PreviewFormat,
     ) -> Result<(View, Option<Picked>), Problem> {
+        if let Some(asked) = &self.profile {
+            asked.fits(thing)?;
+        }
         let mut view = self.view(app)?;
         let knobs = self.profile.is_some() || self.spp.is_some();
         let target = targets::of_query(self.max_error, self.max_seconds, knobs)?;
@@ -377,7 +380,9 @@ pub async fn create(
     Json(order): Json<PreviewOrder>,
 ) -> Result<Answer, Problem> {
     let (thing, weights) = order.thing(&app).await?;
-    let profile = order.profile.clone().unwrap_or_default().of_body()?;
+    let asked = order.profile.clone().unwrap_or_default();
+    asked.fits(&thing).map_err(|problem| problem.in_body())?;
+    let profile = asked.of_body()?;
     let spp = order.samples_per_pixel;
     let asked = View {
         scene: order.scene.unwrap_or_default(),
@@ -388,7 +393,9 @@ pub async fn create(
     let view = view(&app, asked, &Names::BODY)?;
     let format = order.format.unwrap_or(PreviewFormat::Png);
     let key = key(&thing, weights.as_ref(), &view, format.drawn());
-    idempotency.claim(&app, &key.to_string()).await?;
+    idempotency
+        .claim(&app, &format!("{key} {format:?}"))
+        .await?;
     let drawn = draw(&app, thing, weights, format.drawn(), view).await;
     Ok(drawn
         .map_err(|problem| problem.in_body())?
@@ -464,7 +471,7 @@ async fn draw(
     format: PictureFormat,
     view: View,
 ) -> Result<Drawn, Problem> {
-    let begun = Instant::now();
+    let (begun, keep) = (Instant::now(), thing.keep());
     let key = key(&thing, weights.as_ref(), &view, format);
     let _waits = app.watchers.watch(key);
     let kept = loop {
@@ -505,6 +512,7 @@ async fn draw(
         accuracy,
         report,
         picture,
+        keep,
         time: begun.elapsed(),
     })
 }
@@ -547,13 +555,14 @@ struct Drawn {
     accuracy: String,
     report: Bytes,
     picture: CachedResult,
+    keep: Keep,
     time: Duration,
 }
 
 impl Drawn {
     fn answer(self, format: PreviewFormat, picked: Option<&Picked>) -> Answer {
         // What a target picks may change with the machine's load.
-        let keep = picked.map_or(Keep::ForEver, |_| Keep::Revalidated);
+        let keep = picked.map_or(self.keep, |_| Keep::Revalidated);
         let answer = match format {
             PreviewFormat::Json => Answer::bytes("application/json", self.report, keep),
             _ => Answer::result(format.drawn().media_type(), self.picture, keep),

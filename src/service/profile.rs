@@ -3,8 +3,11 @@
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
+use super::app::Shelved;
 use super::problem::Problem;
+use super::works::Thing;
 use crate::accuracy::{Knobs, Profile, ProfileError};
+use crate::workshop::check_clusters;
 
 /// What would be accepted in place of a profile that is none.
 const ACCEPTED: &str =
@@ -90,6 +93,30 @@ impl ProfileText {
             };
             accepting(Problem::parameter(parameter, sentence(&error)), &error)
         })
+    }
+
+    /// Refuses clusters that a paint or a blend does not have: paints are clustered when they are uploaded.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] that names the parameter.
+    pub fn fits(&self, thing: &Shelved) -> Result<(), Problem> {
+        let Some(wanted) = self.0.clusters else {
+            return Ok(());
+        };
+        let (fits, accepted) = match &thing.thing {
+            Thing::Paint(paint) => (
+                check_clusters(&thing.id, paint, wanted as usize).is_ok(),
+                "a profile without clusters, or a paint uploaded with so many",
+            ),
+            Thing::Blend(_) => (
+                false,
+                "a profile without clusters, or a blend of paints uploaded with so many",
+            ),
+        };
+        let detail = format!("{} has the clusters that it has, not {wanted}.", thing.id);
+        let problem = || Problem::parameter("profile", detail).accepting(accepted);
+        fits.then_some(()).ok_or_else(problem)
     }
 
     /// The profile, asked for in a JSON body.

@@ -13,6 +13,7 @@ use crate::paint::PaintFile;
 /// Share done, from 0 to 1. It does not return when the work was called off.
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
+pub use crate::export::Readings;
 pub use crate::measurement::{Layout, ThetaHSpacing};
 pub use crate::workshop::{Estimate, Format, Light, Picked, PictureFormat, Shape, Target, Thing};
 
@@ -179,6 +180,14 @@ pub trait Works: Debug + Send + Sync {
         format: PictureFormat,
         progress: Progress<'_>,
     ) -> Result<Picture, WorkError>;
+
+    /// A paint is read by a virtual multi-angle instrument, at its own angles where none are given.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for angles that no instrument reads at.
+    fn readings(&self, paint: &Thing, aspecular_deg: Option<&[f64]>)
+    -> Result<Readings, WorkError>;
 
     /// What some work will take with a profile.
     ///

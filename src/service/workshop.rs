@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Asked, Estimate, Fault, Format, IngestOrder, Picked, Picture, PictureFormat, Progress, Target,
-    Thing, View, WorkError, Works,
+    Asked, Estimate, Fault, Format, IngestOrder, Picked, Picture, PictureFormat, Progress,
+    Readings, Target, Thing, View, WorkError, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
@@ -162,6 +162,17 @@ impl Works for Workshop {
             accuracy: accuracy.join(", "),
             report: made.report,
         })
+    }
+
+    fn readings(
+        &self,
+        paint: &Thing,
+        aspecular_deg: Option<&[f64]>,
+    ) -> Result<Readings, WorkError> {
+        match paint {
+            Thing::Paint(paint) => Ok(workshop::readings(paint, aspecular_deg)?),
+            Thing::Blend(_) => Err(WorkshopError::internal("a blend is not read").into()),
+        }
     }
 
     fn estimate(&self, asked: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError> {

@@ -16,6 +16,7 @@ mod paints;
 mod previews;
 mod problems;
 mod profiles;
+mod readings;
 mod real;
 
 fn folder() -> tempfile::TempDir {
