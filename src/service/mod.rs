@@ -74,6 +74,8 @@ pub struct ServiceConfig {
     pub most_waiting: usize,
     /// Jobs that may be queued or running.
     pub most_jobs: usize,
+    /// Requests for paints and what is made of them, under way at a time; those that wait for a job are among them.
+    pub most_requests: usize,
     /// Connections at a time.
     pub most_connections: usize,
     /// Longest time for the header of a request.
@@ -95,6 +97,7 @@ impl ServiceConfig {
             disk_bytes: 8 << 30,
             most_waiting: 64,
             most_jobs: 256,
+            most_requests: 512,
             most_connections: 1024,
             header_time: Duration::from_secs(10),
             body_time: Duration::from_secs(10),

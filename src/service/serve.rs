@@ -4,19 +4,23 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::error_handling::HandleErrorLayer;
 use axum::extract::DefaultBodyLimit;
 use axum::routing::get;
-use axum::{Router, middleware};
+use axum::{BoxError, Router, middleware};
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use hyper_util::server::conn::auto::Builder;
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
+use tower::ServiceBuilder;
+use tower::limit::GlobalConcurrencyLimitLayer;
 
 use super::app::App;
 use super::envelope::envelope;
 use super::extract::JSON_BYTES;
+use super::problem::Problem;
 use super::works::Works;
 use super::{
     ServiceConfig, accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations,
@@ -57,7 +61,32 @@ pub async fn open(config: ServiceConfig, works: Arc<dyn Works>) -> Result<App, S
 }
 
 /// All addresses.
+///
+/// No more requests are under way at a time than the settings have it, and those beyond are refused at once instead of
+/// standing in a line that nobody sees. Health, counts and pages answer all the same.
 pub fn router(app: App) -> Router {
+    let most = Arc::new(Semaphore::new(app.config.most_requests));
+    let held = ServiceBuilder::new()
+        .layer(HandleErrorLayer::new(|_: BoxError| async {
+            Problem::overloaded()
+        }))
+        .load_shed()
+        .layer(GlobalConcurrencyLimitLayer::with_semaphore(most));
+    let around = ServiceBuilder::new()
+        .layer(middleware::from_fn_with_state(app.clone(), envelope))
+        // Uploads hold themselves to their own limit, piece by piece.
+        .layer(DefaultBodyLimit::max(JSON_BYTES));
+    resources()
+        .layer(held)
+        .merge(pages())
+        .fallback(|| async { axum::http::StatusCode::NOT_FOUND })
+        .method_not_allowed_fallback(docs::method_not_allowed)
+        .layer(around)
+        .with_state(app)
+}
+
+/// What works on paints.
+fn resources() -> Router<App> {
     Router::new()
         .route("/v1/paints", get(paints::list).post(paints::upload))
         .route(
@@ -88,6 +117,11 @@ pub fn router(app: App) -> Router {
         .route("/v1/accuracy", get(accuracy::show))
         .route("/v1/jobs/{id}", get(jobs::show).delete(jobs::cancel))
         .route("/v1/jobs/{id}/events", get(jobs::events))
+}
+
+/// What tells about the service.
+fn pages() -> Router<App> {
+    Router::new()
         .route("/healthz", get(operations::healthz))
         .route("/readyz", get(operations::readyz))
         .route("/metrics", get(operations::metrics))
@@ -99,12 +133,6 @@ pub fn router(app: App) -> Router {
         .route("/docs/page.css", get(docs::style))
         .route("/openapi.json", get(docs::openapi))
         .route("/problems/{kind}", get(docs::problem))
-        .fallback(|| async { axum::http::StatusCode::NOT_FOUND })
-        .method_not_allowed_fallback(docs::method_not_allowed)
-        // Uploads hold themselves to their own limit, piece by piece.
-        .layer(DefaultBodyLimit::max(JSON_BYTES))
-        .layer(middleware::from_fn_with_state(app.clone(), envelope))
-        .with_state(app)
 }
 
 /// Serves until `stop` returns, then ends: no new connections, requests under way are answered, jobs stay on record.

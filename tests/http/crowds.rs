@@ -1,9 +1,10 @@
 //! Too much work, and callers who never end what they begin.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use carpaint::service::ServiceConfig;
 use futures::future::join_all;
+use tokio::io::AsyncWriteExt;
 
 use crate::client::raw;
 use crate::folder;
@@ -95,5 +96,38 @@ async fn a_body_that_never_ends_is_not_waited_for() {
     let _ = read.await.expect("is answered in time");
     let answer = String::from_utf8_lossy(&answer);
     assert!(answer.starts_with("HTTP/1.1 408"), "{answer}");
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn more_requests_than_are_taken_are_refused_at_once_and_health_answers_still() {
+    let data = folder();
+    let config = ServiceConfig {
+        most_requests: 1,
+        ..ServiceConfig::new(data.path().to_owned())
+    };
+    let house = House::with(config).await;
+    let mut slow = tokio::net::TcpStream::connect(house.address)
+        .await
+        .expect("connects");
+    let begin = b"POST /v1/paints HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nhalf";
+    slow.write_all(begin).await.expect("sent");
+    let deadline = Instant::now() + Duration::from_secs(20);
+    let refused = loop {
+        let answer = house.get("/v1/paints").await;
+        if answer.status != 200 {
+            break answer;
+        }
+        assert!(Instant::now() < deadline, "the upload holds its place");
+    };
+    refused.problem(503, "overloaded");
+    assert!(refused.header("retry-after").is_some(), "{refused:?}");
+    for page in ["/healthz", "/metrics", "/docs"] {
+        assert_eq!(house.get(page).await.status, 200, "{page}");
+    }
+    drop(slow);
+    while house.get("/v1/paints").await.status != 200 {
+        assert!(Instant::now() < deadline, "the place is free again");
+    }
     house.close().await;
 }
