@@ -502,7 +502,7 @@ fn flakes(
         .want("theta_i_deg", "a list of angles")?
         .angles(limits)?;
     let places = (0..theta_h.len()).flat_map(|h| (0..theta_d.len()).map(move |d| (h, d)));
-    let mut names = std::collections::HashSet::new();
+    let mut names = std::collections::BTreeSet::new();
     for name in places.map(|(h, d)| pattern.name(h, d)) {
         if let Some(twice) = names.replace(name) {
             return slices.refuse(format!(

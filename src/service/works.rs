@@ -13,9 +13,10 @@ use crate::paint::PaintFile;
 /// Share done, from 0 to 1. It does not return when the work was called off.
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
-pub use crate::export::Readings;
 pub use crate::measurement::{Layout, ThetaHSpacing};
-pub use crate::workshop::{Estimate, Format, Light, Picked, PictureFormat, Shape, Target, Thing};
+pub use crate::workshop::{
+    Estimate, Format, Light, Picked, PictureFormat, Readings, Shape, Target, Thing,
+};
 
 /// How an upload becomes a paint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

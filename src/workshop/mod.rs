@@ -20,6 +20,7 @@ mod study;
 mod target;
 mod thing;
 
+pub use crate::export::Readings;
 pub use crate::render::Shape;
 pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;
