@@ -8,8 +8,6 @@
 //! (Golla and Klein 2018, eq. 14-15, 4.4). Weights may leave 0..1 and need not sum to 1. The sums themselves stand in
 //! `boxes`; base and lobes have their own files.
 
-use serde::{Deserialize, Serialize};
-
 use super::boxes::{Mixed, mix_boxes};
 use super::clamp::{Clamp, Ledger};
 use super::geometric::geometric_mean;
@@ -17,10 +15,10 @@ use super::{Blend, BlendedFlakes, RealisationWeights, WeightError, base, lobes};
 use crate::paint::{CarPaint, FlakeTexture, Flakes};
 
 /// A synthesised paint and the account of what had to be clamped.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Realised<Paint = CarPaint> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Realised {
     /// The paint, valid whatever the weights were.
-    pub paint: Paint,
+    pub paint: CarPaint,
     /// Every bound that bit.
     pub clamps: Vec<Clamp>,
     /// Sums of the weights for base, flake lightness and flake color.

@@ -9,7 +9,7 @@ use serde_json::json;
 use super::ingest::ReadingArgs;
 use super::number::whole;
 use super::output;
-use super::preview::Size;
+use super::preview::{ShapeName, Size};
 use super::profile::TargetArgs;
 use super::weights::WeightArgs;
 use crate::workshop::{
@@ -71,14 +71,14 @@ enum What {
         input: String,
         #[command(flatten)]
         weights: WeightArgs,
-        /// What the paint is on: sphere, capsule or panel.
+        /// What the paint is on.
         #[arg(
             long,
             value_name = "SHAPE",
             default_value = "sphere",
             allow_hyphen_values = true
         )]
-        scene: String,
+        scene: ShapeName,
         /// Width and height in pixels.
         #[arg(
             long,
@@ -189,7 +189,7 @@ impl Estimate {
                 let mut profile = options.profile;
                 profile.samples_per_pixel = spp.unwrap_or(profile.samples_per_pixel);
                 let view = PreviewOptions {
-                    scene: scene.clone(),
+                    scene: (*scene).into(),
                     size: [size.width, size.height],
                     samples_per_pixel: profile.samples_per_pixel,
                     environment: None,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::ingest::ReadingArgs;
@@ -14,7 +14,7 @@ use super::profile::TargetArgs;
 use super::progress::Progress;
 use super::weights::WeightArgs;
 use crate::workshop::{
-    PictureFormat, PreviewOptions, Work, WorkshopError, open, preview, read_environment,
+    PictureFormat, PreviewOptions, Shape, Work, WorkshopError, open, preview, read_environment,
 };
 
 /// Draw a paint, a blend at given weights, or a sample.
@@ -25,14 +25,14 @@ pub struct Preview {
     input: String,
     #[command(flatten)]
     weights: WeightArgs,
-    /// What the paint is on: sphere, capsule or panel, 40 mm across and near enough to tell its flakes.
+    /// What the paint is on, 40 mm across and near enough to tell its flakes.
     #[arg(
         long,
         value_name = "SHAPE",
         default_value = "sphere",
         allow_hyphen_values = true
     )]
-    scene: String,
+    scene: ShapeName,
     /// Width and height in pixels.
     #[arg(
         long,
@@ -56,6 +56,24 @@ pub struct Preview {
     /// Write the seconds each stage took.
     #[arg(long, value_name = "T.json")]
     timings: Option<PathBuf>,
+}
+
+/// What the paint is on.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ShapeName {
+    Sphere,
+    Capsule,
+    Panel,
+}
+
+impl From<ShapeName> for Shape {
+    fn from(name: ShapeName) -> Self {
+        match name {
+            ShapeName::Sphere => Self::Sphere,
+            ShapeName::Capsule => Self::Capsule,
+            ShapeName::Panel => Self::Panel,
+        }
+    }
 }
 
 /// `WxH` in pixels.
@@ -102,7 +120,7 @@ impl Preview {
             .map(|path| read_environment(path, &options.limits))
             .transpose()?;
         let mut wanted = PreviewOptions {
-            scene: self.scene.clone(),
+            scene: self.scene.into(),
             size: [self.size.width, self.size.height],
             samples_per_pixel: self.spp.unwrap_or(options.profile.samples_per_pixel),
             environment,

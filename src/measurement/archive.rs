@@ -114,11 +114,6 @@ impl Archive {
         )
     }
 
-    /// A zip archive in an open file.
-    pub(super) fn in_file(file: File, limits: &Limits) -> Result<Self, PackageError> {
-        Self::zip(Source::File(Arc::new(file)), limits)
-    }
-
     fn zip(source: Source, limits: &Limits) -> Result<Self, PackageError> {
         let archive = |error: &dyn std::fmt::Display| PackageError::Archive {
             reason: error.to_string(),

@@ -30,6 +30,9 @@ pub(crate) use table::half_frame_pair;
 pub use table::{HalfAngleTable, TableError, ThetaHSpacing};
 pub use tensor::TensorError;
 
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
 use crate::color::LinearRgb;
 use crate::paint::{Direction, Limits};
 
@@ -50,11 +53,13 @@ pub trait MeasuredBrdf: Sync {
 const LAYOUTS: &str = "rgl, mpi-2005, merl or package";
 
 /// How the bytes of a measurement are laid out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Layout {
     /// Tensor file of EPFL's material database (`.bsdf`).
     Rgl,
     /// Half-angle table of the MPI car paints of 2005.
+    #[serde(rename = "mpi-2005")]
     Mpi2005,
     /// Half-angle table of the MERL database.
     Merl,

@@ -5,7 +5,6 @@
 //! threads, so that a package of a gigabyte never stands in memory. Angles are inside the coat where there is one;
 //! slices and tables are BRDF in 1/sr.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use bytes::Bytes;
@@ -215,15 +214,6 @@ impl Package {
     /// [`PackageError`] with the file inside the package and what is wrong with it.
     pub fn open(path: &Path, limits: &Limits) -> Result<Self, PackageError> {
         Self::of(Archive::at(path, limits)?, limits)
-    }
-
-    /// Opens a zip archive in an open file.
-    ///
-    /// # Errors
-    ///
-    /// As [`Package::open`].
-    pub fn from_file(file: File, limits: &Limits) -> Result<Self, PackageError> {
-        Self::of(Archive::in_file(file, limits)?, limits)
     }
 
     /// Opens a zip archive in memory.

@@ -13,12 +13,17 @@
 //! (2018). An isotropic file holds one azimuth of incidence; of an anisotropic one the azimuths are averaged, because
 //! a car paint has none. Out-of-gamut colors stay negative. Accuracy beyond 80° from the normal is the instrument's.
 
+mod density;
+mod fields;
+
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::MeasuredBrdf;
 use super::tensor::{TensorError, Tensors};
 use crate::color::LinearRgb;
 use crate::paint::{Direction, half_angles};
+use density::{Density, Extent};
+use fields::{angles, finite, surface, wrong};
 
 /// Why a tensor file is no reflectance.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -64,90 +69,6 @@ pub enum RglError {
     /// A file whose colors are not multiplied by the warp's Jacobian.
     #[error("field jacobian is {0}, accepted is 1")]
     Jacobian(u8),
-}
-
-/// A rectangle of values over the unit square, bilinear in between.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Extent {
-    rows: usize,
-    columns: usize,
-}
-
-/// Where a point of the unit square lies among an extent's vertices.
-#[derive(Clone, Copy, Debug)]
-struct Cell {
-    row: usize,
-    column: usize,
-    /// Offsets in the cell, `0..=1`.
-    x: f64,
-    y: f64,
-}
-
-impl Extent {
-    const fn len(self) -> usize {
-        self.rows * self.columns
-    }
-
-    fn cell(self, u: f64, v: f64) -> Cell {
-        let (column, x) = split(u, self.columns);
-        let (row, y) = split(v, self.rows);
-        Cell { row, column, x, y }
-    }
-
-    /// Bilinear value in a table of this extent.
-    fn bilinear(self, table: &[f32], cell: Cell) -> f64 {
-        let at =
-            |r: usize, c: usize| f64::from(table[(cell.row + r) * self.columns + cell.column + c]);
-        let lower = (1.0 - cell.x) * at(0, 0) + cell.x * at(0, 1);
-        let upper = (1.0 - cell.x) * at(1, 0) + cell.x * at(1, 1);
-        (1.0 - cell.y) * lower + cell.y * upper
-    }
-}
-
-/// Vertex below a coordinate in `0..=1` among `count >= 2`, and the offset from it.
-fn split(u: f64, count: usize) -> (usize, f64) {
-    let x = u.clamp(0.0, 1.0) * f64::from(u32::try_from(count - 1).unwrap_or(u32::MAX));
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0..=count-1 by the clamp.
-    let low = (x as usize).min(count - 2);
-    (low, x - f64::from(u32::try_from(low).unwrap_or(u32::MAX)))
-}
-
-/// The density of visible normals for one incidence, with its integrals along rows and over rows.
-#[derive(Clone, Debug)]
-struct Density {
-    values: Vec<f64>,
-    /// Integral along a row up to each vertex, in cells.
-    along: Vec<f64>,
-    /// Integral over rows up to each row, in cells.
-    over: Vec<f64>,
-}
-
-impl Density {
-    fn new(extent: Extent, raw: &[f32]) -> Self {
-        let mut along = Vec::with_capacity(extent.len());
-        let mut over = Vec::with_capacity(extent.rows);
-        let (mut sum, mut before) = (0.0, None);
-        for row in raw.chunks_exact(extent.columns) {
-            let mut integral = 0.0;
-            along.push(0.0);
-            for pair in row.windows(2) {
-                integral += f64::midpoint(f64::from(pair[0]), f64::from(pair[1]));
-                along.push(integral);
-            }
-            if let Some(before) = before {
-                sum += f64::midpoint(before, integral);
-            }
-            over.push(sum);
-            before = Some(integral);
-        }
-        let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
-        let scaled = |v: Vec<f64>| v.into_iter().map(|x| x * scale).collect();
-        Self {
-            values: raw.iter().map(|&v| f64::from(v) * scale).collect(),
-            along: scaled(along),
-            over: scaled(over),
-        }
-    }
 }
 
 /// One azimuth of incidence.
@@ -366,75 +287,6 @@ impl MeasuredBrdf for RglMeasurement {
             }
         }
         sum.iter().all(|v| v.is_finite()).then_some(sum)
-    }
-}
-
-fn wrong(name: &'static str, shape: &[usize], accepted: &str) -> RglError {
-    RglError::Shape {
-        name,
-        shape: shape.to_vec(),
-        accepted: accepted.to_owned(),
-    }
-}
-
-/// A field of finite numbers, `>= 0` where it is a density.
-fn finite<'f>(
-    file: &'f Tensors<'_>,
-    name: &'static str,
-    density: bool,
-) -> Result<(Vec<f32>, &'f [usize]), RglError> {
-    let (values, shape) = file.floats(name)?;
-    let accepted = if density {
-        "finite numbers from 0"
-    } else {
-        "finite numbers"
-    };
-    // f32 squared sums must stay finite: nothing a goniometer writes comes near 1e15.
-    let good = |v: f32| v.abs() <= 1e15 && !(density && v < 0.0);
-    match values.iter().position(|&v| !good(v)) {
-        Some(index) => Err(RglError::Value {
-            name,
-            index,
-            value: values[index],
-            accepted,
-        }),
-        None => Ok((values, shape)),
-    }
-}
-
-fn angles(
-    file: &Tensors<'_>,
-    name: &'static str,
-    least: usize,
-    range: std::ops::RangeInclusive<f32>,
-    accepted: &'static str,
-) -> Result<Vec<f64>, RglError> {
-    let (values, shape) = file.floats(name)?;
-    if shape.len() != 1 || values.len() < least || values.len() > 4096 {
-        return Err(wrong(
-            name,
-            shape,
-            &format!("one dimension of {least} to 4096"),
-        ));
-    }
-    for (index, &value) in values.iter().enumerate() {
-        if !range.contains(&value) || (index > 0 && value <= values[index - 1]) {
-            return Err(RglError::Angle {
-                name,
-                index,
-                value,
-                accepted,
-            });
-        }
-    }
-    Ok(values.into_iter().map(f64::from).collect())
-}
-
-fn surface(file: &Tensors<'_>, name: &'static str) -> Result<(Extent, Vec<f32>), RglError> {
-    let (values, shape) = finite(file, name, true)?;
-    match *shape {
-        [rows, columns] if rows >= 2 && columns >= 2 => Ok((Extent { rows, columns }, values)),
-        _ => Err(wrong(name, shape, "[2.., 2..]")),
     }
 }
 

@@ -12,6 +12,9 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::MeasuredBrdf;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
 use crate::color::LinearRgb;
 use crate::paint::{Direction, half_angles};
 
@@ -25,11 +28,14 @@ pub(super) const THETA_D: usize = 90;
 pub(super) const ENTRIES: usize = PHI_D * THETA_H * THETA_D;
 
 /// How the θh bins lie.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = ThetaH)]
 pub enum ThetaHSpacing {
     /// 1° each.
     Linear,
     /// Bin k ends at `((k+1)/90)² · 90°`: fine next to the mirror direction.
+    #[serde(rename = "sqrt")]
     SquareRoot,
 }
 

@@ -42,9 +42,6 @@ pub enum FilmError {
         /// Row, from the top.
         y: usize,
     },
-    /// Pictures of a sheet differ in size, or there are none.
-    #[error("a sheet needs pictures of one size: {0}")]
-    Sheet(String),
 }
 
 impl Film {
@@ -135,55 +132,6 @@ impl Film {
         };
         let at = |k: usize| self.pixels[k].map(half);
         write_exr(self.width, self.height, |k| at(k).into())
-    }
-
-    /// Several pictures side by side in rows of `columns`, without gaps.
-    ///
-    /// # Errors
-    ///
-    /// [`FilmError::Sheet`] for no pictures, or sizes that differ.
-    pub fn contact_sheet(films: &[Self], columns: usize) -> Result<Self, FilmError> {
-        let first = films
-            .first()
-            .ok_or_else(|| FilmError::Sheet("there are none".into()))?;
-        let (w, h) = (first.width, first.height);
-        if let Some(other) = films.iter().find(|f| (f.width, f.height) != (w, h)) {
-            return Err(FilmError::Sheet(format!(
-                "{w} x {h} and {} x {}",
-                other.width, other.height
-            )));
-        }
-        let columns = columns.clamp(1, films.len());
-        let mut pixels = Vec::new();
-        for row in films.chunks(columns) {
-            for y in 0..h as usize {
-                for k in 0..columns {
-                    let range = y * w as usize..(y + 1) * w as usize;
-                    match row.get(k) {
-                        // Exposed here: the sheet has one exposure, its pictures may differ.
-                        Some(film) => pixels.extend(
-                            film.pixels[range]
-                                .iter()
-                                .map(|p| p.map(|v| v * film.exposure)),
-                        ),
-                        // An empty place takes the first picture's background.
-                        None => pixels.extend(range.map(|k| {
-                            first.pixels[k / w as usize * w as usize].map(|v| v * first.exposure)
-                        })),
-                    }
-                }
-            }
-        }
-        let size = |n: u32, k: usize| {
-            let count = u32::try_from(k).ok().and_then(|k| n.checked_mul(k));
-            count.ok_or_else(|| FilmError::Sheet("the sheet is too large".into()))
-        };
-        Ok(Self {
-            width: size(w, columns)?,
-            height: size(h, films.len().div_ceil(columns))?,
-            exposure: 1.0,
-            pixels,
-        })
     }
 }
 
@@ -306,18 +254,5 @@ pub(super) mod tests {
         let bytes = film.to_srgb8();
         let mean = bytes.iter().map(|&b| f64::from(b)).sum::<f64>() / f64::from(64 * 64 * 3);
         assert!((mean - 100.3).abs() < 0.05, "{mean}");
-    }
-
-    #[test]
-    fn a_sheet_holds_its_pictures_in_rows() {
-        let films: Vec<Film> = (0..3_u8)
-            .map(|k| Film::new(2, 1, 1.0, vec![[f32::from(k); 3]; 2]))
-            .collect();
-        let sheet = Film::contact_sheet(&films, 2).expect("one size");
-        assert_eq!((sheet.width(), sheet.height()), (4, 2));
-        let row: Vec<f32> = sheet.pixels().iter().map(|p| p[0]).collect();
-        assert_eq!(row, [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 0.0, 0.0]);
-        assert!(Film::contact_sheet(&[], 2).is_err());
-        assert!(Film::contact_sheet(&[ramp(), Film::new(1, 1, 1.0, vec![[0.0; 3]])], 2).is_err());
     }
 }

@@ -8,10 +8,12 @@
 
 use super::vector::{Vec3, along, cross, dot, perpendicular, scale, sub, unit};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// What is painted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
+#[schema(as = Scene)]
 pub enum Shape {
     /// A ball: every angle at once.
     #[default]

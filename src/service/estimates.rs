@@ -14,7 +14,7 @@ use super::previews::{self, Side};
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::profile::{ProfileDocument, ProfileText};
 use super::targets;
-use super::works::{Asked, Estimate, Format, IngestOrder, PictureFormat, Scene, View, WorkError};
+use super::works::{Asked, Estimate, Format, IngestOrder, PictureFormat, Shape, View, WorkError};
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::PaintFile;
@@ -37,7 +37,7 @@ pub struct EstimateOrder {
     /// File to write, `zip` unless given.
     format: Option<Format>,
     /// What the paint is on, `sphere` unless given.
-    scene: Option<Scene>,
+    scene: Option<Shape>,
     /// Pixels across and down of a picture, 512 each unless given.
     #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
     size: Option<[u32; 2]>,

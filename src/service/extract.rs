@@ -257,7 +257,7 @@ impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for Address
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::Scene;
+    use crate::service::Shape;
     use serde::Deserialize;
     use utoipa::ToSchema;
 
@@ -271,7 +271,7 @@ mod tests {
         #[schema(minimum = 1, maximum = 4096)]
         clusters: Option<u32>,
         #[allow(dead_code)] // read by the reader only
-        scene: Option<Scene>,
+        scene: Option<Shape>,
         #[allow(dead_code)] // read by the reader only
         size: Option<[u32; 2]>,
         #[allow(dead_code)] // read by the reader only

@@ -50,7 +50,7 @@ pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
     Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
-    Progress, Readings, Scene, Target, ThetaH, Thing, View, WorkError, Works,
+    Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 

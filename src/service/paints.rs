@@ -25,7 +25,7 @@ use super::targets;
 use super::visibility::Visibility;
 use super::waiting::Prefer;
 use super::workbench::CalledOff;
-use super::works::{Asked, Format, IngestOrder, Layout, Picked, Target, ThetaH};
+use super::works::{Asked, Format, IngestOrder, Layout, Picked, Target, ThetaHSpacing};
 use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
 use crate::workshop::NAME_CHARACTERS;
 
@@ -52,7 +52,7 @@ pub struct IngestQuery {
     /// What the file is, where its bytes do not say.
     layout: Option<Layout>,
     /// Spacing of `theta_h` in an MPI 2005 table.
-    theta_h: Option<ThetaH>,
+    theta_h: Option<ThetaHSpacing>,
     /// Bytes before the values of an MPI 2005 table, 84 unless given.
     #[param(maximum = 1_048_576)]
     header_bytes: Option<u64>,

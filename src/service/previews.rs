@@ -20,7 +20,7 @@ use super::profile::{ProfileDocument, ProfileText};
 use super::targets;
 use super::weights::WeightQuery;
 use super::workbench::call_off;
-use super::works::{Asked, Light, Picked, Picture, PictureFormat, Scene, View};
+use super::works::{Asked, Light, Picked, Picture, PictureFormat, Shape, View};
 use crate::blend::RealisationWeights;
 use crate::store::{CachedResult, Hash};
 
@@ -38,7 +38,7 @@ const MOST_LIGHTS: usize = 16;
 #[into_params(parameter_in = Query)]
 pub struct ViewQuery {
     /// What the paint is on, `sphere` unless given.
-    scene: Option<Scene>,
+    scene: Option<Shape>,
     /// Width and height in pixels, `512x512` unless given.
     #[param(value_type = Option<String>, pattern = "^[0-9]{1,4}x[0-9]{1,4}$", example = "512x512")]
     size: Option<Size>,
@@ -344,7 +344,7 @@ pub struct PreviewOrder {
     /// Factor on the flakes' color: 0 makes them white, 1 leaves them.
     flake_saturation: Option<f64>,
     /// What the paint is on, `sphere` unless given.
-    scene: Option<Scene>,
+    scene: Option<Shape>,
     /// Width and height in pixels, 512 and 512 unless given.
     #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
     size: Option<[u32; 2]>,

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use utoipa::ToSchema;
 
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
@@ -15,32 +14,8 @@ use crate::paint::PaintFile;
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
 pub use crate::export::Readings;
-pub use crate::workshop::{Estimate, Picked, Target, Thing};
-
-/// What a measurement file is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Layout {
-    /// MPI 2005 table.
-    #[serde(rename = "mpi-2005")]
-    Mpi2005,
-    /// MERL binary.
-    Merl,
-    /// RGL tensor file.
-    Rgl,
-    /// Measured-paint package.
-    Package,
-}
-
-/// How θh is spaced in an MPI 2005 table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ThetaH {
-    /// Evenly.
-    Linear,
-    /// Densely near the normal.
-    Sqrt,
-}
+pub use crate::measurement::{Layout, ThetaHSpacing};
+pub use crate::workshop::{Estimate, Format, Light, Picked, PictureFormat, Shape, Target, Thing};
 
 /// How an upload becomes a paint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -50,7 +25,7 @@ pub struct IngestOrder {
     /// What the file is, where its bytes do not say.
     pub layout: Option<Layout>,
     /// Spacing of θh.
-    pub theta_h: Option<ThetaH>,
+    pub theta_h: Option<ThetaHSpacing>,
     /// Bytes before the values of an MPI 2005 table.
     pub header_bytes: Option<u64>,
     /// Index of refraction of the coat, where the caller knows it.
@@ -61,61 +36,11 @@ pub struct IngestOrder {
     pub clusters: Option<u32>,
 }
 
-/// What a realisation is written as.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Format {
-    /// Texture bundle.
-    Zip,
-    /// glTF binary.
-    Glb,
-    /// `material.json` with the textures inline.
-    Json,
-    /// A `.paint`, which can be blended again.
-    Paint,
-}
-
-/// What a picture is written as.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum PictureFormat {
-    /// Tone mapped for a screen, 8 bits.
-    Png,
-    /// Linear light.
-    Exr,
-}
-
-/// What the paint is on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Scene {
-    /// A ball.
-    #[default]
-    Sphere,
-    /// A capsule.
-    Capsule,
-    /// A flat panel.
-    Panel,
-}
-
-/// Light of one direction.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Light {
-    /// Towards the light, of any length: x to the right, y up, z towards the viewer.
-    #[schema(min_items = 3, max_items = 3)]
-    pub towards: [f32; 3],
-    /// Irradiance on a surface that faces it, linear sRGB; that of the scene's usual light unless given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(min_items = 3, max_items = 3)]
-    pub irradiance: Option<[f32; 3]>,
-}
-
 /// What a picture shows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct View {
     /// What the paint is on.
-    pub scene: Scene,
+    pub scene: Shape,
     /// Pixels across and down.
     pub size: [u32; 2],
     /// Samples per pixel.
@@ -280,48 +205,4 @@ pub trait Works: Debug + Send + Sync {
 
     /// What is known about a paint or a blend.
     fn describe(&self, thing: &Thing) -> Value;
-}
-
-impl Format {
-    /// Media type of the file.
-    #[must_use]
-    pub const fn media_type(self) -> &'static str {
-        match self {
-            Self::Zip => "application/zip",
-            Self::Glb => "model/gltf-binary",
-            Self::Json => "application/json",
-            Self::Paint => "application/vnd.carpaint.paint",
-        }
-    }
-
-    /// Ending of the file's name.
-    #[must_use]
-    pub const fn ending(self) -> &'static str {
-        match self {
-            Self::Zip => "zip",
-            Self::Glb => "glb",
-            Self::Json => "json",
-            Self::Paint => "paint",
-        }
-    }
-}
-
-impl PictureFormat {
-    /// Media type of the file.
-    #[must_use]
-    pub const fn media_type(self) -> &'static str {
-        match self {
-            Self::Png => "image/png",
-            Self::Exr => "image/x-exr",
-        }
-    }
-
-    /// Ending of the file's name.
-    #[must_use]
-    pub const fn ending(self) -> &'static str {
-        match self {
-            Self::Png => "png",
-            Self::Exr => "exr",
-        }
-    }
 }

@@ -5,14 +5,14 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
-    Progress, Readings, Scene, Target, ThetaH, Thing, View, WorkError, Works,
+    Asked, Estimate, Fault, Format, IngestOrder, Picked, Picture, PictureFormat, Progress,
+    Readings, Target, Thing, View, WorkError, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
-use crate::measurement::{self, ReadOptions, ThetaHSpacing};
+use crate::measurement::ReadOptions;
 use crate::paint::{Limits, PaintFile};
-use crate::workshop::{self, IngestOptions, PreviewLight, PreviewOptions, Work, WorkshopError};
+use crate::workshop::{self, IngestOptions, PreviewOptions, Work, WorkshopError};
 
 /// Does the work, within limits.
 #[derive(Clone, Copy, Debug)]
@@ -45,21 +45,11 @@ impl From<WorkshopError> for WorkError {
 
 impl Workshop {
     fn options(&self, order: &IngestOrder) -> IngestOptions {
-        let layout = order.layout.map(|layout| match layout {
-            Layout::Mpi2005 => measurement::Layout::Mpi2005,
-            Layout::Merl => measurement::Layout::Merl,
-            Layout::Rgl => measurement::Layout::Rgl,
-            Layout::Package => measurement::Layout::Package,
-        });
-        let theta_h = order.theta_h.map(|spacing| match spacing {
-            ThetaH::Linear => ThetaHSpacing::Linear,
-            ThetaH::Sqrt => ThetaHSpacing::SquareRoot,
-        });
         IngestOptions {
             name: order.name.clone(),
             read: ReadOptions {
-                layout,
-                theta_h,
+                layout: order.layout,
+                theta_h: order.theta_h,
                 header_bytes: order.header_bytes,
             },
             coat_ior: order.coat_ior,
@@ -84,7 +74,7 @@ impl Workshop {
             } => then(&Work::Realise {
                 thing,
                 weights,
-                format: format_of(format),
+                format,
                 written: false,
             }),
             Asked::Preview {
@@ -96,7 +86,7 @@ impl Workshop {
                 thing,
                 weights,
                 options: &options_of(view),
-                format: picture_of(format),
+                format,
                 limits: &self.limits,
                 written: false,
             }),
@@ -104,40 +94,13 @@ impl Workshop {
     }
 }
 
-const fn format_of(format: Format) -> workshop::Format {
-    match format {
-        Format::Zip => workshop::Format::Zip,
-        Format::Glb => workshop::Format::Glb,
-        Format::Json => workshop::Format::Json,
-        Format::Paint => workshop::Format::Paint,
-    }
-}
-
-const fn picture_of(format: PictureFormat) -> workshop::PictureFormat {
-    match format {
-        PictureFormat::Png => workshop::PictureFormat::Png,
-        PictureFormat::Exr => workshop::PictureFormat::Exr,
-    }
-}
-
 fn options_of(view: &View) -> PreviewOptions {
-    let scene = match view.scene {
-        Scene::Sphere => "sphere",
-        Scene::Capsule => "capsule",
-        Scene::Panel => "panel",
-    };
     PreviewOptions {
-        scene: scene.to_owned(),
+        scene: view.scene,
         size: view.size,
         samples_per_pixel: view.samples_per_pixel,
         environment: None,
-        lights: view.lights.as_ref().map(|lights| {
-            let light = |light: &Light| PreviewLight {
-                towards: light.towards,
-                irradiance: light.irradiance,
-            };
-            lights.iter().map(light).collect()
-        }),
+        lights: view.lights.clone(),
     }
 }
 
@@ -168,7 +131,6 @@ impl Works for Workshop {
         format: Format,
         profile: &Profile,
     ) -> Result<Vec<u8>, WorkError> {
-        let format = format_of(format);
         Ok(workshop::realise(thing, weights, format, profile)?.bytes)
     }
 
@@ -184,7 +146,7 @@ impl Works for Workshop {
         format: PictureFormat,
         progress: Progress<'_>,
     ) -> Result<Picture, WorkError> {
-        let (options, format) = (options_of(view), picture_of(format));
+        let options = options_of(view);
         let made = workshop::preview(thing, weights, &options, format, &self.limits, progress)?;
         let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
         let mut accuracy = Vec::new();

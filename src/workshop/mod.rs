@@ -20,6 +20,7 @@ mod study;
 mod target;
 mod thing;
 
+pub use crate::render::Shape;
 pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};
@@ -30,9 +31,7 @@ pub use ingest::{
     BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, check_clusters, ingest,
     ingest_upload, open_measurement,
 };
-pub use previewing::{
-    PictureFormat, PreviewLight, PreviewOptions, preview, read_environment, texels,
-};
+pub use previewing::{Light, PictureFormat, PreviewOptions, preview, read_environment, texels};
 pub use reading::{MOST_ANGLES, readings};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
 use serde_json::json;
+use utoipa::ToSchema;
 
 use super::realising::{Made, choose, error_of};
 use super::{Thing, WorkshopError, read};
@@ -15,8 +17,8 @@ use crate::render::{
 /// What a picture shows.
 #[derive(Clone, Debug)]
 pub struct PreviewOptions {
-    /// `sphere`, `capsule` or `panel`.
-    pub scene: String,
+    /// What the paint is on.
+    pub scene: Shape,
     /// Pixels across and down.
     pub size: [u32; 2],
     /// Samples per pixel.
@@ -24,20 +26,25 @@ pub struct PreviewOptions {
     /// Panorama that lights it; the built-in studio unless given.
     pub environment: Option<Environment>,
     /// Lights in place of the usual one of the scene.
-    pub lights: Option<Vec<PreviewLight>>,
+    pub lights: Option<Vec<Light>>,
 }
 
 /// Light of one direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PreviewLight {
-    /// Towards the light, of any length.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Light {
+    /// Towards the light, of any length: x to the right, y up, z towards the viewer.
+    #[schema(min_items = 3, max_items = 3)]
     pub towards: [f32; 3],
     /// Irradiance on a surface that faces it, linear sRGB; that of the scene's usual light unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 3, max_items = 3)]
     pub irradiance: Option<[f32; 3]>,
 }
 
 /// What a picture is written as.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PictureFormat {
     /// Tone mapped for a screen, 8 bits.
     Png,
@@ -46,6 +53,24 @@ pub enum PictureFormat {
 }
 
 impl PictureFormat {
+    /// Media type of the file.
+    #[must_use]
+    pub const fn media_type(self) -> &'static str {
+        match self {
+            Self::Png => "image/png",
+            Self::Exr => "image/x-exr",
+        }
+    }
+
+    /// Ending of the file's name.
+    #[must_use]
+    pub const fn ending(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Exr => "exr",
+        }
+    }
+
     /// The format that a file name's ending means.
     ///
     /// # Errors
@@ -86,7 +111,7 @@ pub fn preview(
     limits: &Limits,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Made, WorkshopError> {
-    let scene = scene_of(options)?;
+    let scene = scene_of(options);
     let chosen = choose(thing, weights)?;
     let rendering = render::render(&chosen.paint, &scene, limits, progress).map_err(refused)?;
     let bytes = match format {
@@ -118,35 +143,26 @@ pub(super) fn sampling(
     options: &PreviewOptions,
     limits: &Limits,
 ) -> Result<SamplingError, WorkshopError> {
-    let scene = scene_of(options)?;
+    let scene = scene_of(options);
     let chosen = choose(thing, weights)?;
     render::sampling(&chosen.paint, &scene, limits).map_err(refused)
 }
 
-fn scene_of(options: &PreviewOptions) -> Result<Scene, WorkshopError> {
-    let shape: Shape = serde_json::from_value(json!(options.scene)).map_err(|_| {
-        WorkshopError::usage(
-            "scene",
-            format!(
-                "there is no scene '{}'; there are sphere, capsule and panel",
-                options.scene
-            ),
-        )
-    })?;
-    let mut scene = Scene::new(shape, options.size);
+fn scene_of(options: &PreviewOptions) -> Scene {
+    let mut scene = Scene::new(options.scene, options.size);
     scene.samples_per_pixel = options.samples_per_pixel;
     if let Some(environment) = &options.environment {
         scene = scene.in_environment(environment.clone());
     }
     if let Some(lights) = &options.lights {
-        let usual = DirectionalLight::key(shape).irradiance;
-        let light = |light: &PreviewLight| DirectionalLight {
+        let usual = DirectionalLight::key(options.scene).irradiance;
+        let light = |light: &Light| DirectionalLight {
             towards: light.towards,
             irradiance: light.irradiance.unwrap_or(usual),
         };
         scene.lights = lights.iter().map(light).collect();
     }
-    Ok(scene)
+    scene
 }
 
 fn refused(error: RenderError) -> WorkshopError {

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use utoipa::ToSchema;
 
 use super::describing::describe_correspondence;
 use super::{Thing, WorkshopError};
@@ -14,7 +16,8 @@ use crate::export::{self, About, ExportSettings};
 use crate::paint::{CarPaint, Clamp, Clustering, PaintFile, Provenance, Realisation, certify};
 
 /// What a realisation is written as.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Format {
     /// Texture bundle.
     Zip,
@@ -38,6 +41,28 @@ pub struct Made {
 }
 
 impl Format {
+    /// Media type of the file.
+    #[must_use]
+    pub const fn media_type(self) -> &'static str {
+        match self {
+            Self::Zip => "application/zip",
+            Self::Glb => "model/gltf-binary",
+            Self::Json => "application/json",
+            Self::Paint => "application/vnd.carpaint.paint",
+        }
+    }
+
+    /// Ending of the file's name.
+    #[must_use]
+    pub const fn ending(self) -> &'static str {
+        match self {
+            Self::Zip => "zip",
+            Self::Glb => "glb",
+            Self::Json => "json",
+            Self::Paint => "paint",
+        }
+    }
+
     /// The format that a file name's ending means.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::ingest::{IngestOptions, ingest};
 use super::{WorkshopError, samples};
 use crate::blend::{Blend, RealisationWeights, Realised};
-use crate::paint::{CarPaint, Limits, PaintFile};
+use crate::paint::{Limits, PaintFile};
 
 /// Where a named thing is.
 #[derive(Clone, Debug, PartialEq)]
@@ -175,10 +175,7 @@ impl Thing {
     /// # Errors
     ///
     /// [`WorkshopError`] for weights that the blend refuses.
-    pub fn realise(
-        self,
-        weights: Option<&RealisationWeights>,
-    ) -> Result<Realised<CarPaint>, WorkshopError> {
+    pub fn realise(self, weights: Option<&RealisationWeights>) -> Result<Realised, WorkshopError> {
         match self {
             Self::Paint(file) => Ok(Realised {
                 paint: file.paint,

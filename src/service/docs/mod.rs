@@ -40,7 +40,7 @@ const POLICY: &str =
     components(schemas(
         documents::PaintDocument, documents::PaintList, documents::PaintSummary, documents::BlendDocument,
         blends::BlendOrder, profile::ProfileDocument, profile::KnobsDocument, estimates::EstimateOrder, estimates::EstimateDocument, runner::JobDocument, operations::Health, ProblemDocument,
-        works::Layout, works::ThetaH, works::Format, previews::PreviewFormat, previews::PreviewOrder, works::Light, works::Scene,
+        works::Layout, works::ThetaHSpacing, works::Format, previews::PreviewFormat, previews::PreviewOrder, works::Light, works::Shape,
     )),
     tags(
         (name = "paints", description = "Uploads become paints"),

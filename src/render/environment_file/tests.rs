@@ -1,0 +1,204 @@
+//! Skies whole, damaged, too large and too bright.
+
+use super::*;
+use crate::render::film::write_exr;
+use exr::image::{Blocks, Encoding, Image, Layer, SpecificChannels};
+use exr::math::Vec2;
+use exr::meta::attribute::LineOrder;
+use exr::meta::header::LayerAttributes;
+use exr::prelude::WritableImage;
+use half::f16;
+
+fn hdr() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let pixels: Vec<image::Rgb<f32>> = (0..32_u8)
+        .map(|k| image::Rgb([f32::from(k), 0.5, 2.0]))
+        .collect();
+    image::codecs::hdr::HdrEncoder::new(&mut bytes)
+        .encode(&pixels, 8, 4)
+        .expect("encodes");
+    bytes
+}
+
+fn sky(bad: f32) -> Vec<u8> {
+    write_exr(8, 4, |k| {
+        if k == 11 {
+            (bad, 1.0, 1.0)
+        } else {
+            (0.5_f32, 1.0, 2.0)
+        }
+    })
+    .expect("encodes")
+}
+
+#[test]
+fn both_formats_are_read() {
+    let limits = Limits::default();
+    let up = Environment::from_bytes(&sky(0.5), &limits)
+        .expect("exr")
+        .radiance([0.0, 1.0, 0.0]);
+    assert!((up[0] - 0.5).abs() < 1e-6 && (up[2] - 2.0).abs() < 1e-6);
+    let somewhere = Environment::from_bytes(&hdr(), &limits)
+        .expect("hdr")
+        .radiance([0.0, 0.2, 0.9]);
+    assert!((somewhere[2] - 2.0).abs() < 0.02);
+}
+
+#[test]
+fn pixels_that_are_no_light_are_refused_or_held_and_counted() {
+    let limits = Limits::default();
+    for light in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let error = Environment::from_bytes(&sky(light), &limits).expect_err("no light");
+        assert!(
+            matches!(error, EnvironmentError::NotFinite { x: 3, y: 1, .. }),
+            "{error}"
+        );
+    }
+    for (light, told) in [
+        (0.5, None),
+        (65504.0, None),
+        (-1.0, Some("1 channels below 0, down to -1, are drawn as 0")),
+        (
+            1e6,
+            Some("1 channels above 65504, up to 1000000, are drawn as 65504"),
+        ),
+    ] {
+        let sky = Environment::from_bytes(&sky(light), &limits).expect("held");
+        let told = told.map(|what| format!("environment: {what}"));
+        assert_eq!(sky.held().line(), told);
+        assert!(sky.level().is_finite() && sky.level() >= 0.0);
+    }
+}
+
+#[test]
+fn sizes_are_checked_before_anything_is_allocated() {
+    let limits = Limits {
+        pixels: 31,
+        ..Limits::default()
+    };
+    for bytes in [hdr(), sky(0.5)] {
+        assert!(matches!(
+            Environment::from_bytes(&bytes, &limits),
+            Err(EnvironmentError::Size { .. })
+        ));
+    }
+}
+
+#[test]
+fn cut_and_damaged_files_are_errors_or_pictures_never_panics() {
+    let limits = Limits {
+        pixels: 1 << 20,
+        ..Limits::default()
+    };
+    for whole in [hdr(), sky(0.5)] {
+        for cut in 0..whole.len() {
+            assert!(
+                Environment::from_bytes(&whole[..cut], &limits).is_err(),
+                "cut to {cut} of {}",
+                whole.len()
+            );
+        }
+        for k in 0..whole.len() {
+            for bit in 0..8 {
+                let mut damaged = whole.clone();
+                damaged[k] ^= 1 << bit;
+                let _ = Environment::from_bytes(&damaged, &limits);
+            }
+        }
+    }
+}
+
+/// The same 24 x 17 sky in every way of storing that is read: compression, and blocks as lines or as tiles.
+fn stored() -> Vec<(String, Vec<u8>)> {
+    let compressions = [
+        Compression::Uncompressed,
+        Compression::RLE,
+        Compression::ZIP1,
+        Compression::ZIP16,
+        Compression::PIZ,
+        Compression::PXR24,
+        Compression::B44,
+        Compression::B44A,
+    ];
+    let blocks = [
+        Blocks::ScanLines,
+        Blocks::Tiles(Vec2(8, 8)),
+        Blocks::Tiles(Vec2(7, 5)),
+    ];
+    let pixel = |at: Vec2<usize>| {
+        let light = |k: usize| f16::from_f32(((at.x() * 7 + at.y() * 3 + k) % 11) as f32 / 8.0);
+        (light(0), light(1), light(2))
+    };
+    let mut all = Vec::new();
+    for compression in compressions {
+        for blocks in blocks {
+            let encoding = Encoding {
+                compression,
+                blocks,
+                line_order: LineOrder::Increasing,
+            };
+            let channels = SpecificChannels::rgb(pixel);
+            let layer = Layer::new((24, 17), LayerAttributes::named("sky"), encoding, channels);
+            let mut bytes = Cursor::new(Vec::new());
+            Image::from_layer(layer)
+                .write()
+                .non_parallel()
+                .to_buffered(&mut bytes)
+                .expect("encodes");
+            all.push((format!("{compression:?} {blocks:?}"), bytes.into_inner()));
+        }
+    }
+    all
+}
+
+#[test]
+fn every_compression_in_lines_and_tiles_reads_as_the_same_sky() {
+    let limits = Limits::default();
+    let level = |bytes: &[u8]| {
+        Environment::from_bytes(bytes, &limits)
+            .expect("reads")
+            .level()
+    };
+    let all = stored();
+    let whole = level(&all[0].1);
+    for (name, bytes) in &all {
+        // B44 keeps six bits of every sixteen pixels' differences; the others keep halves as they are.
+        let loss = if name.starts_with("B44") { 0.02 } else { 0.0 };
+        let told = level(bytes);
+        assert!(
+            (told - whole).abs() <= loss * whole,
+            "{name}: {told}, not {whole}"
+        );
+    }
+}
+
+#[test]
+fn every_compression_cut_or_swapped_is_an_error_or_a_picture_never_a_panic() {
+    let limits = Limits {
+        pixels: 1 << 20,
+        ..Limits::default()
+    };
+    let all = stored();
+    for (k, (name, whole)) in all.iter().enumerate() {
+        let header = whole.len() - whole.len() / 2;
+        for cut in (0..header).step_by(13).chain(header..whole.len()) {
+            assert!(
+                Environment::from_bytes(&whole[..cut], &limits).is_err(),
+                "{name} cut to {cut} of {}",
+                whole.len()
+            );
+        }
+        // Every byte of the file turned over in one way, and the data of one put under the head of another.
+        for at in 0..whole.len() {
+            let mut damaged = whole.clone();
+            damaged[at] ^= [0x01, 0x80, 0xff][at % 3];
+            let _ = Environment::from_bytes(&damaged, &limits);
+        }
+        let other = &all[(k + 5) % all.len()].1;
+        for share in 1..8 {
+            let (head, tail) = (whole.len() * share / 8, other.len() * share / 8);
+            let swapped = [&whole[..head], &other[tail..]].concat();
+            let _ = Environment::from_bytes(&swapped, &limits);
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Too much work, and callers who never end what they begin.
+
+use std::time::Duration;
+
+use carpaint::service::ServiceConfig;
+use futures::future::join_all;
+
+use crate::client::raw;
+use crate::folder;
+use crate::house::House;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn too_much_work_is_turned_away_with_a_time_to_come_back() {
+    let data = folder();
+    let config = ServiceConfig {
+        most_waiting: 1,
+        most_jobs: 1,
+        ..ServiceConfig::new(data.path().to_owned())
+    };
+    let house = House::with(config).await;
+    let (a, b) = (house.paint("silver").await, house.paint("blue").await);
+    let blend = house.blend(&[&a, &b]).await;
+    let asked = (0..24).map(|k| format!("/v1/blends/{blend}/realisation.zip?alpha={k}&beta=1"));
+    let answers = join_all(asked.map(|path| {
+        let house = &house;
+        async move { house.get(&path).await }
+    }))
+    .await;
+    let refused: Vec<_> = answers
+        .iter()
+        .filter(|answer| answer.status != 200)
+        .collect();
+    assert!(
+        !refused.is_empty() && refused.len() < 24,
+        "{} of 24",
+        refused.len()
+    );
+    for answer in refused {
+        answer.problem(503, "overloaded");
+        assert!(answer.header("retry-after").is_some());
+    }
+    let first = house
+        .ask(
+            "POST",
+            "/v1/paints",
+            &[("Prefer", "respond-async")],
+            b"slow four",
+        )
+        .await;
+    assert_eq!(first.status, 202);
+    house
+        .ask(
+            "POST",
+            "/v1/paints",
+            &[("Prefer", "respond-async")],
+            b"slow five",
+        )
+        .await
+        .problem(503, "overloaded");
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_header_that_never_ends_is_not_waited_for() {
+    let data = folder();
+    let config = ServiceConfig {
+        header_time: Duration::from_millis(300),
+        ..ServiceConfig::new(data.path().to_owned())
+    };
+    let house = House::with(config).await;
+    let half = b"GET /healthz HTTP/1.1\r\nHost: x\r\nX-Half".as_slice();
+    for silent in [half, b"", b"G", b"PRI * HTTP/2.0\r\n"] {
+        let answer = tokio::time::timeout(Duration::from_secs(5), raw(house.address, silent)).await;
+        assert!(answer.is_ok(), "{:?}", String::from_utf8_lossy(silent));
+    }
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_body_that_never_ends_is_not_waited_for() {
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    let data = folder();
+    let config = ServiceConfig {
+        body_time: Duration::from_millis(300),
+        ..ServiceConfig::new(data.path().to_owned())
+    };
+    let house = House::with(config).await;
+    let mut stream = tokio::net::TcpStream::connect(house.address)
+        .await
+        .expect("connects");
+    let head = "POST /v1/blends HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: 50\r\n\r\n{";
+    stream.write_all(head.as_bytes()).await.expect("sends");
+    let mut answer = Vec::new();
+    let read = tokio::time::timeout(Duration::from_secs(5), stream.read_to_end(&mut answer));
+    let _ = read.await.expect("is answered in time");
+    let answer = String::from_utf8_lossy(&answer);
+    assert!(answer.starts_with("HTTP/1.1 408"), "{answer}");
+    house.close().await;
+}

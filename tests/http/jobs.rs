@@ -1,0 +1,205 @@
+//! Longer work, and what becomes of it over a restart.
+
+use std::time::{Duration, Instant};
+
+use carpaint::service::ServiceConfig;
+use futures::future::join_all;
+use serde_json::json;
+
+use crate::house::House;
+use crate::{folder, walk};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let answer = house
+        .ask(
+            "POST",
+            "/v1/paints",
+            &[("Prefer", "respond-async")],
+            b"slow one",
+        )
+        .await;
+    assert_eq!(answer.status, 202, "{answer:?}");
+    let address = answer.header("location").expect("a job").to_owned();
+    assert_eq!(
+        format!("/v1/jobs/{}", answer.json()["id"].as_str().expect("an id")),
+        address
+    );
+
+    let other = house
+        .ask(
+            "POST",
+            "/v1/paints",
+            &[("Prefer", "respond-async")],
+            b"slow one",
+        )
+        .await;
+    assert_eq!(
+        other.json()["id"],
+        answer.json()["id"],
+        "the same upload waits for the same job"
+    );
+
+    let events = house.get(&format!("{address}/events")).await;
+    assert_eq!(events.header("content-type"), Some("text/event-stream"));
+    let text = events.text();
+    assert!(
+        text.matches("event: progress").count() > 5 && text.matches("event: end").count() == 1,
+        "{text}"
+    );
+    let last = text
+        .lines()
+        .rfind(|line| line.starts_with("data: "))
+        .expect("data");
+    let job: serde_json::Value = serde_json::from_str(&last[6..]).expect("JSON");
+    assert_eq!(
+        (&job["state"], &job["progress"]),
+        (&json!("done"), &json!(1.0))
+    );
+    assert!(text.contains("seconds_left"));
+    assert_eq!(house.get(&address).await.json(), job);
+    assert_eq!(
+        house
+            .get(job["result"].as_str().expect("an address"))
+            .await
+            .status,
+        200
+    );
+    house
+        .ask("DELETE", &address, &[], b"")
+        .await
+        .problem(409, "job-ended");
+    assert!(
+        house
+            .get(&format!("{address}/events"))
+            .await
+            .text()
+            .starts_with("event: end")
+    );
+
+    let begun = Instant::now();
+    let answer = house
+        .ask(
+            "POST",
+            "/v1/paints",
+            &[("Prefer", "respond-async")],
+            b"slow two",
+        )
+        .await;
+    let address = answer.header("location").expect("a job").to_owned();
+    let cancelled = house.ask("DELETE", &address, &[], b"").await;
+    assert_eq!(
+        (cancelled.status, &cancelled.json()["state"]),
+        (200, &json!("cancelled")),
+        "{cancelled:?}"
+    );
+    assert!(begun.elapsed() < Duration::from_secs(3));
+    assert_eq!(house.get(&address).await.json()["state"], "cancelled");
+
+    let failed = house
+        .ask(
+            "POST",
+            "/v1/paints",
+            &[("Prefer", "respond-async")],
+            b"not one",
+        )
+        .await;
+    let address = failed.header("location").expect("a job").to_owned();
+    while !["failed"].contains(
+        &house.get(&address).await.json()["state"]
+            .as_str()
+            .expect("a state"),
+    ) {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    let problem = house.get(&address).await.json()["problem"].clone();
+    assert_eq!(problem["type"], "/problems/unusable-measurement");
+    assert_eq!(problem["detail"], "the upload: this is no measurement");
+    let blobs = walk(&data.path().join("blobs"));
+    assert_eq!(
+        blobs, 2,
+        "one paint and its upload: what came to nothing is not kept"
+    );
+    house.close().await;
+}
+
+/// Files under a folder.
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_restart_changes_nothing_and_goes_on_with_what_was_under_way() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let (a, b) = (house.paint("silver").await, house.paint("blue").await);
+    let blend = house.blend(&[&a, &b]).await;
+    let addresses = [
+        format!("/v1/paints/{a}"),
+        format!("/v1/blends/{blend}"),
+        format!("/v1/blends/{blend}/realisation.zip?alpha=0.25&beta=0.75"),
+        format!("/v1/blends/{blend}/preview.png?alpha=0.25&beta=0.75"),
+    ];
+    let before = join_all(addresses.iter().map(|path| house.get(path))).await;
+    let answer = house
+        .ask(
+            "POST",
+            "/v1/paints",
+            &[("Prefer", "respond-async")],
+            b"slow three",
+        )
+        .await;
+    let job = answer.header("location").expect("a job").to_owned();
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    assert_eq!(house.get(&job).await.json()["state"], "running");
+    house.close().await;
+
+    let house = House::open(data.path()).await;
+    let after = join_all(addresses.iter().map(|path| house.get(path))).await;
+    for ((before, after), path) in before.iter().zip(&after).zip(&addresses) {
+        assert_eq!(
+            (after.status, after.etag(), &after.body),
+            (200, before.etag(), &before.body),
+            "{path}"
+        );
+    }
+    assert_eq!(
+        house.count("carpaint_realisations_computed_total").await,
+        0.0,
+        "results are kept"
+    );
+    assert_eq!(house.count("carpaint_blends_computed_total").await, 0.0);
+    assert_eq!(house.blend(&[&b, &a]).await.len(), blend.len());
+    assert_eq!(
+        house.count("carpaint_blends_computed_total").await,
+        0.0,
+        "the other order shares the kept correspondence"
+    );
+    let begun = Instant::now();
+    while house.get(&job).await.json()["state"] != "done" {
+        assert!(
+            begun.elapsed() < Duration::from_secs(30),
+            "{:?}",
+            house.get(&job).await
+        );
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_data_folder_serves_one_process() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let second = carpaint::service::open(
+        ServiceConfig::new(data.path().to_owned()),
+        std::sync::Arc::new(crate::house::Pretend),
+    );
+    assert!(
+        second
+            .await
+            .expect_err("in use")
+            .to_string()
+            .contains("in use")
+    );
+    house.close().await;
+}
