@@ -1,10 +1,8 @@
 //! `material.json` of a blend: each paint's numbers as they are to be summed, and what they have in common.
 
 use serde::Serialize;
-use serde_json::{Map, Value};
 
-use super::clamp::Clamped;
-use super::document::{COLOR_SPACE, Carrier, MODEL, texture_entries};
+use super::document::{COLOR_SPACE, Carrier, MODEL, Written};
 use super::numbers::{self, ANY, Number};
 use super::textures::Textures;
 use super::{About, ExportError, ExportSettings};
@@ -39,12 +37,8 @@ struct Document<'a> {
     paints: Vec<PaintEntry<'a>>,
     color_table: AnglesEntry<'a>,
     flakes: Option<FlakesEntry<'a>>,
-    settings: ExportSettings,
-    textures: Map<String, Value>,
-    shader: &'static str,
-    clamped: &'a [Clamped],
-    report: &'a Value,
-    documentation: Value,
+    #[serde(flatten)]
+    written: Written<'a>,
 }
 
 #[derive(Serialize)]
@@ -106,6 +100,13 @@ pub(super) fn blend_document(
         },
         flakes: part.texture,
     });
+    let explained = [
+        PAINTS,
+        numbers::ANGLES,
+        numbers::TEXTURES,
+        numbers::REPORT,
+        numbers::PROVENANCE,
+    ];
     let table = &even.color_table;
     let document = Document {
         format: "carpaint blend",
@@ -137,18 +138,7 @@ pub(super) fn blend_document(
             },
             corner_rounding_lab: textures.corner_rounding_lab,
         }),
-        settings: *settings,
-        textures: texture_entries(textures, &Carrier::Files)?,
-        shader: "carpaint.glsl",
-        clamped: &textures.clamped,
-        report: &about.report,
-        documentation: numbers::documentation(&[
-            PAINTS,
-            numbers::ANGLES,
-            numbers::TEXTURES,
-            numbers::REPORT,
-            numbers::PROVENANCE,
-        ]),
+        written: Written::of(about, settings, textures, &Carrier::Files, &explained)?,
     };
     Ok(serde_json::to_vec_pretty(&document)?)
 }
