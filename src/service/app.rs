@@ -12,6 +12,7 @@ use serde::Serialize;
 use tokio::sync::{RwLock, watch};
 
 use super::ServiceConfig;
+use super::answer::Keep;
 use super::ids;
 use super::metrics::Metrics;
 use super::problem::{Kind, Problem};
@@ -79,6 +80,17 @@ pub struct Shelved {
     pub visibility: Visibility,
     /// Blob of its measurement, where there was one.
     pub measurement: Option<Hash>,
+}
+
+impl Shelved {
+    /// How long files and pictures of it may be kept: what is private, by who asked for it.
+    #[must_use]
+    pub fn keep(&self) -> Keep {
+        match self.visibility {
+            Visibility::Published => Keep::ForEver,
+            Visibility::Private => Keep::Own,
+        }
+    }
 }
 
 /// What else than its paints was asked of a blend, kept with its record.

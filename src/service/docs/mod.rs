@@ -13,7 +13,7 @@ use super::extract::Address;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::{
     accuracy, blend_bundles, blends, documents, estimates, jobs, operations, paints, previews,
-    profile, realisations, runner, visibility, works,
+    profile, readings, realisations, runner, visibility, works,
 };
 
 /// Only what this service itself serves.
@@ -31,7 +31,7 @@ const POLICY: &str =
     paths(
         paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete, visibility::change,
         blends::create, blends::show, blend_bundles::bundle,
-        realisations::of_blend, realisations::of_paint,
+        readings::show, readings::table, realisations::of_blend, realisations::of_paint,
         previews::of_blend, previews::of_paint, previews::create,
         estimates::create, accuracy::show,
         jobs::show, jobs::events, jobs::cancel,
