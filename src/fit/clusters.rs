@@ -91,7 +91,7 @@ pub struct Clusterer {
     /// The picture's numbers, pixel by pixel.
     light: Vec<[f32; 4]>,
     crowd: Crowd,
-    stream: sampled::Stream,
+    passage: sampled::Passage,
 }
 
 impl Clusterer {

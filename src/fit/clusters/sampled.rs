@@ -22,7 +22,7 @@ const LOTS_OF_SUM: usize = 16;
 
 /// Room for the texels of a picture that pass, kept from picture to picture.
 #[derive(Debug, Default)]
-pub(super) struct Stream {
+pub(super) struct Passage {
     /// The brightest texels, and some more.
     aside: Vec<Texel>,
     aside_light: Vec<[f32; 4]>,
@@ -227,27 +227,27 @@ impl Clusterer {
         self.crowd
             .split(&mut self.texels[..crowd], most - taken.len());
         let ways = Ways::of(&self.crowd);
-        let stream = &mut self.stream;
-        stream.begin(&self.crowd);
-        stream.pass(planes, &ways, least, settings.box_rule);
+        let passage = &mut self.passage;
+        passage.begin(&self.crowd);
+        passage.pass(planes, &ways, least, settings.box_rule);
 
-        let ends = bright_groups(pixels - stream.dead, bright);
+        let ends = bright_groups(pixels - passage.dead, bright);
         let taken = ends.last().copied().unwrap_or(0);
-        let crowd = stream.aside.len().checked_sub(taken)?;
+        let crowd = passage.aside.len().checked_sub(taken)?;
         if taken > 0 && crowd > 0 {
-            brightest_last(&mut stream.aside, taken);
+            brightest_last(&mut passage.aside, taken);
         }
-        stream.return_to_crowd(crowd, &ways);
-        let texels = groups(crowd, &ends).map(|group| &stream.aside[group]);
-        let bright = texels.map(|texels| Members::of(texels, &stream.aside_light));
-        let members = bright.chain(stream.sums.iter().filter_map(Sums::members));
+        passage.return_to_crowd(crowd, &ways);
+        let texels = groups(crowd, &ends).map(|group| &passage.aside[group]);
+        let bright = texels.map(|texels| Members::of(texels, &passage.aside_light));
+        let members = bright.chain(passage.sums.iter().filter_map(Sums::members));
         let boxed = members.map(|members| match settings.box_rule {
             BoxRule::Tight => (members, members.hull),
             BoxRule::Moments => (members, members.moments([0.0; 3])),
         });
         Some(SliceClusters {
-            dead: stream.dead,
-            beyond: stream.beyond,
+            dead: passage.dead,
+            beyond: passage.beyond,
             ..gathered(boxed.collect())
         })
     }
@@ -276,7 +276,7 @@ impl Clusterer {
     }
 }
 
-impl Stream {
+impl Passage {
     fn begin(&mut self, crowd: &Crowd) {
         self.aside.clear();
         self.aside_light.clear();
