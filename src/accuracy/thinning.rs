@@ -51,8 +51,8 @@ mod tests {
         Flakes {
             theta_h: AngleGrid::new(vec![0.0, 5.0, 10.0, 15.0, 20.0]).expect("ascends"),
             theta_d: AngleGrid::single(),
-            offsets: vec![0, 1, 2, 3, 4, 5],
-            probability: vec![1.0; 5],
+            offsets: vec![0, 1, 2, 3, 4, 5].into(),
+            probability: vec![1.0; 5].into(),
             lower: lightness.map(|l| [l, 0.0, 0.0]).to_vec(),
             upper: lightness.map(|l| [l + 1.0, 0.0, 0.0]).to_vec(),
             texture: FlakeTexture {

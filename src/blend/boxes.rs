@@ -1,33 +1,30 @@
 //! Weighted sums of the boxes of corresponding clusters, at the speed of memory.
 //!
-//! Sums run over a few clusters of all paints at a time, so that they stay in the nearest cache: each corner is read once
-//! and written once. A box that extrapolation turned inside out gets its corners ordered again, and corners are held to
-//! [`MAX_LAB`]; both are looked for as the corners pass, and only a block that has one is gone through number by number.
-//! Boxes are not clamped to `L >= 0`, because the light they stand for is clamped once, when it is evaluated.
+//! ```text
+//! l = Σ_m w_m g_m,   l' = Σ_m w_m g'_m      (g, g' the corners of a cluster's box in paint m)
+//! ```
+//!
+//! One pass reads every corner once and writes both corners of the sum; the number of paints is known to the compiler,
+//! so that the loop is as plain as `a·X + b·Y`. On the way the signs of `l' − l` are gathered: only a block in which
+//! extrapolation turned a box inside out is gone through again, number by number, to put its corners in order. Whether
+//! a sum can leave ±[`MAX_LAB`] at all follows from the weights and the farthest corner, before anything is summed; if
+//! it can, or a weight is large, every number is summed in 64 bits and held. Boxes are not clamped to `L >= 0`, because
+//! the light they stand for is clamped once, when it is evaluated.
 
-use std::ops::{AddAssign, Mul};
-
-use super::Boxes;
 use super::clamp::Ledger;
-use crate::paint::MAX_LAB;
+use super::{BlendedFlakes, Boxes};
+use crate::paint::{MAX_LAB, largest_magnitude};
 
-/// Numbers of a run that the compiler turns into vectors: a whole number of corners and of vector registers.
-const RUN: usize = 12;
-/// Numbers of a block: four of them, sums and corners, fit the nearest cache.
-const BLOCK: usize = RUN * 64;
+/// Numbers of a block, a whole number of corners: the blocks of two paints and their weights stay in the nearest cache.
+const BLOCK: usize = 768;
 /// Largest weight up to which sums of 32-bit products are exact enough: with Σ|w| below 20 and corners of a few hundred
 /// Lab they are off by 20 · 300 · 2^-24 = 4e-4 Lab at most. Beyond it cancellation would bite, and sums take 64 bits.
 const MODERATE: f64 = 4.0;
-
-/// Boxes of a realisation and what became of them.
-pub(super) struct Mixed {
-    pub lower: Vec<[f32; 3]>,
-    pub upper: Vec<[f32; 3]>,
-    pub account: Account,
-}
+/// What rounding may add to a 32-bit sum of five products: relative, 2^-24 for every product, sum and weight.
+const ROUNDING: f64 = 1.0 + 11.0 * 6e-8;
 
 /// How many corners had to be mended, and the worst of them.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub(super) struct Account {
     inverted: usize,
     narrowest: f64,
@@ -46,107 +43,173 @@ impl Account {
 
     /// Orders a pair of numbers and holds them.
     #[allow(clippy::cast_possible_truncation)] // boxes are kept at texel precision
-    fn mend(&mut self, low: &mut f32, high: &mut f32, exact: [f64; 2]) {
-        let [l, h] = exact;
-        self.inverted += usize::from(h < l);
-        self.narrowest = self.narrowest.min(h - l);
-        let (l, h) = (l.min(h), l.max(h));
-        let reach = h.max(-l) - MAX_LAB;
+    fn mended(&mut self, [low, high]: [f64; 2]) -> [f32; 2] {
+        self.inverted += usize::from(high < low);
+        self.narrowest = self.narrowest.min(high - low);
+        let (low, high) = (low.min(high), low.max(high));
+        let reach = high.max(-low) - MAX_LAB;
         self.beyond += usize::from(reach > 0.0);
         self.furthest = self.furthest.max(reach);
-        *low = l.clamp(-MAX_LAB, MAX_LAB) as f32;
-        *high = h.clamp(-MAX_LAB, MAX_LAB) as f32;
+        [low, high].map(|v| v.clamp(-MAX_LAB, MAX_LAB) as f32)
+    }
+
+    /// Orders the numbers of a block whose magnitude is known to be in range.
+    fn put_in_order(&mut self, low: &mut [f32], high: &mut [f32]) {
+        let (mut inverted, mut widest) = (0_u32, 0_i32);
+        for (low, high) in low.iter_mut().zip(high) {
+            let (l, h) = (*low, *high);
+            let turned = h < l;
+            inverted += u32::from(turned);
+            // Positive differences compare like their bits, and above all others.
+            widest = widest.max((l - h).to_bits().cast_signed());
+            (*low, *high) = if turned { (h, l) } else { (l, h) };
+        }
+        self.inverted += inverted as usize;
+        let widest = f32::from_bits(widest.cast_unsigned());
+        self.narrowest = self.narrowest.min(-f64::from(widest));
     }
 }
 
-/// `Σ_m w_m g_m` for both corners of every cluster; `weights` are per paint, for L, a and b.
-pub(super) fn mix_boxes(paints: &[Boxes], weights: &[[f64; 3]]) -> Mixed {
-    if weights.iter().flatten().all(|w| w.abs() <= MODERATE) {
-        #[allow(clippy::cast_possible_truncation)] // moderate weights of texels
-        sums(paints, weights, |w| w as f32, f64::from, |v| v)
-    } else {
-        #[allow(clippy::cast_possible_truncation)] // held before it is used
-        sums(paints, weights, |w| w, |v| v, |v| v as f32)
+/// Magnitude that no number of any corner exceeds, infinite where a corner is no number.
+pub(super) fn reach(paints: &[Boxes]) -> f32 {
+    let lists = paints.iter().flat_map(|own| [&own.lower, &own.upper]);
+    lists
+        .map(|list| largest_magnitude(list.as_flattened()))
+        .map(|own| if own.is_nan() { f32::INFINITY } else { own })
+        .fold(0.0, f32::max)
+}
+
+/// `Σ_m w_m g_m` for both corners of every cluster into `out`; `weights` are per paint, for L, a and b.
+pub(super) fn mix_boxes(flakes: &BlendedFlakes, weights: &[[f64; 3]], out: &mut Boxes) -> Account {
+    let clusters = flakes.probability.len();
+    for list in [&mut out.lower, &mut out.upper] {
+        if list.capacity() < clusters {
+            *list = vec![[0.0; 3]; clusters];
+        } else {
+            list.resize(clusters, [0.0; 3]);
+        }
+    }
+    let largest = |axis: usize| weights.iter().map(|w| w[axis].abs()).sum::<f64>();
+    let size = largest(0).max(largest(1)).max(largest(2));
+    let held = size * f64::from(flakes.reach) * ROUNDING <= MAX_LAB;
+    if !held || weights.iter().flatten().any(|w| w.abs() > MODERATE) {
+        return wide(&flakes.boxes, weights, out);
+    }
+    match flakes.boxes.as_slice() {
+        [a, b] => narrow([a, b], weights, out),
+        [a, b, c] => narrow([a, b, c], weights, out),
+        [a, b, c, d] => narrow([a, b, c, d], weights, out),
+        [a, b, c, d, e] => narrow([a, b, c, d, e], weights, out),
+        _ => wide(&flakes.boxes, weights, out),
     }
 }
 
-fn sums<T>(
-    paints: &[Boxes],
-    weights: &[[f64; 3]],
-    weight: fn(f64) -> T,
-    exact: fn(T) -> f64,
-    texel: fn(T) -> f32,
-) -> Mixed
-where
-    T: Copy + Default + From<f32> + Mul<Output = T> + AddAssign,
-{
-    let patterns: Vec<[T; RUN]> = weights
-        .iter()
-        .map(|axes| std::array::from_fn(|k| weight(axes[k % 3])))
-        .collect();
-    let clusters = paints.first().map_or(0, |p| p.lower.len());
-    let (mut lower, mut upper) = (Vec::with_capacity(clusters), Vec::with_capacity(clusters));
+/// Sums in 64 bits, every number ordered and held.
+fn wide(paints: &[Boxes], weights: &[[f64; 3]], out: &mut Boxes) -> Account {
     let mut account = Account::default();
-    let (mut low, mut high) = ([T::default(); BLOCK], [T::default(); BLOCK]);
-    let (mut to_low, mut to_high) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
-    for first in (0..3 * clusters).step_by(BLOCK) {
-        let here = first..(first + BLOCK).min(3 * clusters);
-        let count = here.len();
-        let (low, high) = (&mut low[..count], &mut high[..count]);
-        let (to_low, to_high) = (&mut to_low[..count], &mut to_high[..count]);
-        low.fill(T::default());
-        high.fill(T::default());
-        for (own, pattern) in paints.iter().zip(&patterns) {
-            add(low, &own.lower.as_flattened()[here.clone()], pattern);
-            add(high, &own.upper.as_flattened()[here.clone()], pattern);
-        }
-        let mut odd = 0;
-        for k in 0..count {
-            (to_low[k], to_high[k]) = (texel(low[k]), texel(high[k]));
-            odd |= is_odd(to_low[k], to_high[k]);
-        }
-        if odd != 0 {
-            for k in 0..count {
-                let exact = [exact(low[k]), exact(high[k])];
-                account.mend(&mut to_low[k], &mut to_high[k], exact);
+    for (k, (low, high)) in out.lower.iter_mut().zip(&mut out.upper).enumerate() {
+        for axis in 0..3 {
+            let mut pair = [0.0; 2];
+            for (own, w) in paints.iter().zip(weights) {
+                pair[0] += w[axis] * f64::from(own.lower[k][axis]);
+                pair[1] += w[axis] * f64::from(own.upper[k][axis]);
             }
+            [low[axis], high[axis]] = account.mended(pair);
         }
-        lower.extend_from_slice(to_low.as_chunks().0);
-        upper.extend_from_slice(to_high.as_chunks().0);
     }
-    Mixed {
-        lower,
-        upper,
-        account,
+    account
+}
+
+/// Sums in 32 bits that stay in range.
+fn narrow<const PAINTS: usize>(
+    paints: [&Boxes; PAINTS],
+    weights: &[[f64; 3]],
+    out: &mut Boxes,
+) -> Account {
+    #[allow(clippy::cast_possible_truncation)] // moderate weights of texels
+    let weights: [[f32; 3]; PAINTS] = std::array::from_fn(|m| weights[m].map(|w| w as f32));
+    if weights.iter().all(|w| *w == [w[0]; 3]) {
+        return blocks(paints, &weights.map(|w| w[0]), out);
+    }
+    let patterns: [[f32; BLOCK]; PAINTS] = weights.map(|axes| std::array::from_fn(|k| axes[k % 3]));
+    blocks(paints, &patterns, out)
+}
+
+fn blocks<const PAINTS: usize>(
+    paints: [&Boxes; PAINTS],
+    weights: &[impl Weight; PAINTS],
+    out: &mut Boxes,
+) -> Account {
+    let mut account = Account::default();
+    let (lower, upper) = (out.lower.as_flattened_mut(), out.upper.as_flattened_mut());
+    for first in (0..lower.len()).step_by(BLOCK) {
+        let here = first..(first + BLOCK).min(lower.len());
+        let (low, high) = (&mut lower[here.clone()], &mut upper[here.clone()]);
+        let ordered = sums(
+            weights,
+            paints.map(|own| &own.lower.as_flattened()[here.clone()]),
+            paints.map(|own| &own.upper.as_flattened()[here.clone()]),
+            low,
+            high,
+        );
+        if !ordered {
+            account.put_in_order(low, high);
+        }
+    }
+    account
+}
+
+/// One weight for all three axes, or weights that repeat along a block.
+trait Weight {
+    fn at(&self, k: usize) -> f32;
+}
+
+impl Weight for f32 {
+    #[inline(always)]
+    fn at(&self, _: usize) -> f32 {
+        *self
     }
 }
 
-fn add<T>(sum: &mut [T], own: &[f32], pattern: &[T; RUN])
-where
-    T: Copy + From<f32> + Mul<Output = T> + AddAssign,
-{
-    let (sums, tail) = sum.as_chunks_mut::<RUN>();
-    let (runs, rest) = own.as_chunks::<RUN>();
-    for (sum, run) in sums.iter_mut().zip(runs) {
-        for k in 0..RUN {
-            sum[k] += pattern[k] * T::from(run[k]);
-        }
-    }
-    for ((sum, &own), &weight) in tail.iter_mut().zip(rest).zip(pattern) {
-        *sum += weight * T::from(own);
+impl Weight for [f32; BLOCK] {
+    #[inline(always)]
+    fn at(&self, k: usize) -> f32 {
+        self[k]
     }
 }
 
-/// Not 0 where a side is inside out or beyond the bound.
-#[allow(clippy::cast_possible_truncation)] // 2000 is exact
-fn is_odd(low: f32, high: f32) -> u32 {
-    const MOST: f32 = MAX_LAB as f32;
-    u32::from(high < low) | u32::from(high > MOST) | u32::from(low < -MOST)
+/// Both corners of a block of at most [`BLOCK`] numbers, and whether no box is inside out.
+///
+/// A function of its own: its two outputs are known to be apart from everything else, so that the loop becomes vectors.
+#[inline(never)]
+fn sums<const PAINTS: usize>(
+    weights: &[impl Weight; PAINTS],
+    lower: [&[f32]; PAINTS],
+    upper: [&[f32]; PAINTS],
+    low: &mut [f32],
+    high: &mut [f32],
+) -> bool {
+    let count = low.len().min(BLOCK);
+    let (low, high) = (&mut low[..count], &mut high[..count]);
+    let (lower, upper) = (lower.map(|l| &l[..count]), upper.map(|u| &u[..count]));
+    let mut signs = 0;
+    for k in 0..count {
+        let mut l = weights[0].at(k) * lower[0][k];
+        let mut h = weights[0].at(k) * upper[0][k];
+        for m in 1..PAINTS {
+            l += weights[m].at(k) * lower[m][k];
+            h += weights[m].at(k) * upper[m][k];
+        }
+        signs |= (h - l).to_bits();
+        (low[k], high[k]) = (l, h);
+    }
+    signs >> 31 == 0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::paint::AngleGrid;
     use proptest::prelude::*;
 
     fn boxes(count: usize, seed: f32) -> Boxes {
@@ -158,6 +221,23 @@ mod tests {
             lower: (0..count).map(|k| corner(k, 0.0)).collect(),
             upper: (0..count).map(|k| corner(k, 3.0 + seed)).collect(),
         }
+    }
+
+    fn flakes(boxes: Vec<Boxes>) -> BlendedFlakes {
+        let clusters = boxes[0].lower.len();
+        BlendedFlakes::new(
+            [AngleGrid::single(), AngleGrid::single()],
+            vec![0, u32::try_from(clusters).expect("few")].into(),
+            vec![1.0 / clusters as f64; clusters].into(),
+            boxes,
+            vec![],
+        )
+    }
+
+    fn mixed(boxes: Vec<Boxes>, weights: &[[f64; 3]]) -> (Boxes, Account) {
+        let mut out = Boxes::default();
+        let account = mix_boxes(&flakes(boxes), weights, &mut out);
+        (out, account)
     }
 
     /// Corner by corner, in 64 bits.
@@ -175,36 +255,59 @@ mod tests {
         #[test]
         fn every_corner_is_its_weighted_sum(
             count in 1..700_usize, weights in prop::collection::vec(prop::array::uniform3(-40.0..40.0_f64), 2..=5),
-            small in prop::bool::ANY,
+            small in prop::bool::ANY, alike in prop::bool::ANY,
         ) {
-            let weights: Vec<[f64; 3]> = weights.iter().map(|w| w.map(|w| if small { w / 10.0 } else { w })).collect();
+            let weights: Vec<[f64; 3]> = weights.iter()
+                .map(|w| if alike { [w[0]; 3] } else { *w })
+                .map(|w| w.map(|w| if small { w / 10.0 } else { w }))
+                .collect();
             let paints: Vec<Boxes> = (0..weights.len()).map(|m| boxes(count, m as f32)).collect();
-            let mixed = mix_boxes(&paints, &weights);
+            let (mixed, account) = mixed(paints.clone(), &weights);
             // Products and sums of numbers below 70: 2 M roundings of 2^-24 each in 32 bits, one in 64.
             let size: f64 = weights.iter().flatten().fold(1.0, |m: f64, w| m.max(w.abs())) * 70.0;
             let tolerance = 2.0 * weights.len() as f64 * size * f64::from(f32::EPSILON);
+            let mut inverted = 0;
             for k in 0..count {
                 for axis in 0..3 {
                     let [low, high] = plainly(&paints, &weights, k, axis);
                     prop_assert!((f64::from(mixed.lower[k][axis]) - low).abs() <= tolerance);
                     prop_assert!((f64::from(mixed.upper[k][axis]) - high).abs() <= tolerance);
+                    let width = |w: &[f64; 3], own: &Boxes| w[axis] * f64::from(own.upper[k][axis] - own.lower[k][axis]);
+                    let width: f64 = weights.iter().zip(&paints).map(|(w, own)| width(w, own)).sum();
+                    inverted += usize::from(width < -tolerance);
                 }
             }
+            prop_assert!(account.inverted >= inverted, "{} of at least {inverted}", account.inverted);
+            prop_assert!(inverted == 0 || account.narrowest < 0.0);
         }
     }
 
     #[test]
     fn a_weight_of_one_gives_the_very_boxes() {
-        let paints = [boxes(1000, 0.0), boxes(1000, 1.0)];
-        let mixed = mix_boxes(&paints, &[[1.0; 3], [0.0; 3]]);
-        assert_eq!(mixed.lower, paints[0].lower);
-        assert_eq!(mixed.upper, paints[0].upper);
+        let paints = vec![boxes(1000, 0.0), boxes(1000, 1.0)];
+        let (mixed, account) = mixed(paints.clone(), &[[1.0; 3], [0.0; 3]]);
+        assert_eq!(mixed, paints[0]);
+        assert_eq!(account, Account::default());
+    }
+
+    #[test]
+    fn lists_that_were_used_before_give_the_same() {
+        let paints = || vec![boxes(500, 0.0), boxes(500, 1.0)];
+        let weights = [[1.4; 3], [-0.4; 3]];
+        let fresh = mixed(paints(), &weights);
+        for used in [3, 500, 2000] {
+            let mut out = boxes(used, 7.0);
+            let account = mix_boxes(&flakes(paints()), &weights, &mut out);
+            assert_eq!((out, account), fresh);
+        }
     }
 
     #[test]
     fn moderate_and_large_weights_meet_where_they_part() {
-        let paints = [boxes(999, 0.0), boxes(999, 1.0)];
-        let at = |w: f64| mix_boxes(&paints, &[[w; 3], [1.0 - w; 3]]);
+        let at = |w: f64| {
+            let paints = vec![boxes(999, 0.0), boxes(999, 1.0)];
+            mixed(paints, &[[w; 3], [1.0 - w; 3]]).0
+        };
         let (narrow, wide) = (at(MODERATE), at(MODERATE + 1e-12));
         let corners = narrow.lower.iter().chain(&narrow.upper).flatten();
         for (a, b) in corners.zip(wide.lower.iter().chain(&wide.upper).flatten()) {
@@ -219,14 +322,26 @@ mod tests {
             lower: vec![[low; 3]],
             upper: vec![[high; 3]],
         };
-        let mixed = mix_boxes(&[one(10.0, 12.0), one(10.0, 20.0)], &[[2.0; 3], [-1.0; 3]]);
-        assert_eq!((mixed.lower[0], mixed.upper[0]), ([4.0; 3], [10.0; 3]));
-        assert_eq!((mixed.account.inverted, mixed.account.narrowest), (3, -6.0));
-        let mixed = mix_boxes(&[one(10.0, 12.0), one(1.0, 1.0)], &[[1e9; 3], [0.0; 3]]);
-        assert_eq!((mixed.lower[0], mixed.upper[0]), ([2000.0; 3], [2000.0; 3]));
-        assert_eq!(
-            (mixed.account.beyond, mixed.account.furthest),
-            (3, 12e9 - 2000.0)
-        );
+        let pair = vec![one(10.0, 12.0), one(10.0, 20.0)];
+        let (out, account) = mixed(pair, &[[2.0; 3], [-1.0; 3]]);
+        assert_eq!((out.lower[0], out.upper[0]), ([4.0; 3], [10.0; 3]));
+        assert_eq!((account.inverted, account.narrowest), (3, -6.0));
+        let far = vec![one(10.0, 12.0), one(1.0, 1.0)];
+        let (out, account) = mixed(far, &[[1e9; 3], [0.0; 3]]);
+        assert_eq!((out.lower[0], out.upper[0]), ([2000.0; 3], [2000.0; 3]));
+        assert_eq!((account.beyond, account.furthest), (3, 12e9 - 2000.0));
+        let near = vec![one(900.0, 1000.0), one(-10.0, 1.0)];
+        let (out, account) = mixed(near, &[[3.0; 3], [-2.0; 3]]);
+        assert_eq!((out.lower[0], out.upper[0]), ([2000.0; 3], [2000.0; 3]));
+        assert_eq!((account.beyond, account.furthest), (3, 998.0));
+    }
+
+    #[test]
+    fn corners_that_are_no_numbers_are_never_summed_quickly() {
+        let mut paints = vec![boxes(20, 0.0), boxes(20, 1.0)];
+        for worst in [f32::NAN, f32::NEG_INFINITY] {
+            paints[1].upper[19][2] = worst;
+            assert_eq!(reach(&paints), f32::INFINITY);
+        }
     }
 }

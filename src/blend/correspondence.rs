@@ -149,9 +149,14 @@ pub(super) fn correspond(
         }
     };
     let mut best: Option<(f64, Vec<usize>, Vec<SliceBlend>)> = None;
+    let several = tried.len() > 1;
     for order in tried {
         let slices = join_in_order(paints, &order, grid, settings, &tell)?;
-        let cost = slices.iter().map(|s| s.pairwise_cost(settings.cost)).sum();
+        let cost = if several {
+            slices.iter().map(|s| s.pairwise_cost(settings.cost)).sum()
+        } else {
+            0.0
+        };
         // Of equals the first, which is the canonical order where it is among them.
         if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
             best = Some((cost, order, slices));
@@ -161,14 +166,13 @@ pub(super) fn correspond(
     let pairs = pair_reports(paints, &slices, grid, settings, &order)?;
 
     let total: usize = slices.iter().map(|s| s.probability.len()).sum();
-    let with_room = || Boxes {
-        lower: Vec::with_capacity(total),
-        upper: Vec::with_capacity(total),
-    };
+    let boxes: Vec<Boxes> = (0..paints.len())
+        .into_par_iter()
+        .map(|place| boxes_of(place, &slices, total))
+        .collect();
     let mut offsets = Vec::with_capacity(count + 1);
     offsets.push(0);
     let mut probability = Vec::with_capacity(total);
-    let mut boxes: Vec<Boxes> = paints.iter().map(|_| with_room()).collect();
     let mut report = CorrespondenceReport {
         slices: count,
         clusters: total,
@@ -178,10 +182,6 @@ pub(super) fn correspond(
     };
     for slice in slices {
         probability.extend_from_slice(&slice.probability);
-        for (all, own) in boxes.iter_mut().zip(&slice.boxes) {
-            all.lower.extend(own.iter().map(|b| b.0));
-            all.upper.extend(own.iter().map(|b| b.1));
-        }
         offsets.push(u32::try_from(probability.len()).unwrap_or(u32::MAX));
         report.mean_cost += slice.cost;
         report.largest_gap = report.largest_gap.max(slice.gap);
@@ -198,16 +198,28 @@ pub(super) fn correspond(
     }
     let textures = textures(paints);
     Ok((
-        Some(BlendedFlakes {
-            theta_h,
-            theta_d,
-            offsets,
-            probability,
+        Some(BlendedFlakes::new(
+            [theta_h, theta_d],
+            offsets.into(),
+            probability.into(),
             boxes,
             textures,
-        }),
+        )),
         report,
     ))
+}
+
+/// The boxes of one paint in all slices, so many together.
+fn boxes_of(place: usize, slices: &[SliceBlend], total: usize) -> Boxes {
+    let mut all = Boxes {
+        lower: Vec::with_capacity(total),
+        upper: Vec::with_capacity(total),
+    };
+    for slice in slices {
+        all.lower.extend(slice.boxes[place].iter().map(|b| b.0));
+        all.upper.extend(slice.boxes[place].iter().map(|b| b.1));
+    }
+    all
 }
 
 /// All slices with the paints joined in this order; boxes stay in the paints' own order.

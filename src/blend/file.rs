@@ -202,7 +202,7 @@ fn read_flakes(
     paints: usize,
     reader: &mut Reader<'_>,
 ) -> Result<BlendedFlakes, ContainerError> {
-    let (offsets, probability) = (reader.array()?, reader.array()?);
+    let (offsets, probability) = (reader.array()?.into(), reader.array()?.into());
     let mut boxes = Vec::with_capacity(paints);
     for _ in 0..paints {
         boxes.push(Boxes {
@@ -210,19 +210,13 @@ fn read_flakes(
             upper: reader.array()?,
         });
     }
-    let FlakeHeader {
-        theta_h_deg: theta_h,
-        theta_d_deg: theta_d,
-        textures,
-    } = header;
-    Ok(BlendedFlakes {
-        theta_h,
-        theta_d,
+    Ok(BlendedFlakes::new(
+        [header.theta_h_deg, header.theta_d_deg],
         offsets,
         probability,
         boxes,
-        textures,
-    })
+        header.textures,
+    ))
 }
 
 impl PaintHeader {

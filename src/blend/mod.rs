@@ -15,6 +15,7 @@ mod boxes;
 mod clamp;
 mod correspondence;
 mod file;
+mod geometric;
 mod lobes;
 mod mixture;
 mod order;
@@ -36,8 +37,11 @@ pub use realise::Realised;
 pub use weights::{RealisationWeights, WeightError};
 
 use correspondence::correspond;
+use rayon::prelude::*;
 
-use crate::paint::{AngleGrid, CarPaint, Clustering, Coat, ColorTable, FlakeTexture, Lobe};
+use crate::paint::{
+    AngleGrid, CarPaint, Clustering, Coat, ColorTable, FlakeTexture, Lobe, SharedList,
+};
 use crate::transport::TransportError;
 
 /// Fewest and most paints of a blend.
@@ -83,10 +87,12 @@ pub(crate) struct BlendedPaint {
 pub(crate) struct BlendedFlakes {
     pub theta_h: AngleGrid,
     pub theta_d: AngleGrid,
-    pub offsets: Vec<u32>,
-    pub probability: Vec<f64>,
+    pub offsets: SharedList<u32>,
+    pub probability: SharedList<f64>,
     /// Boxes of each paint, one list a paint, in the order of `Blend::paints`.
     pub boxes: Vec<Boxes>,
+    /// Magnitude that no number of any corner exceeds, Lab.
+    pub reach: f32,
     pub textures: Vec<FlakeTexture>,
 }
 
@@ -95,6 +101,27 @@ pub(crate) struct BlendedFlakes {
 pub(crate) struct Boxes {
     pub lower: Vec<[f32; 3]>,
     pub upper: Vec<[f32; 3]>,
+}
+
+impl BlendedFlakes {
+    /// Corresponding clusters on these angles of θh and θd.
+    fn new(
+        [theta_h, theta_d]: [AngleGrid; 2],
+        offsets: SharedList<u32>,
+        probability: SharedList<f64>,
+        boxes: Vec<Boxes>,
+        textures: Vec<FlakeTexture>,
+    ) -> Self {
+        Self {
+            theta_h,
+            theta_d,
+            offsets,
+            probability,
+            reach: boxes::reach(&boxes),
+            boxes,
+            textures,
+        }
+    }
 }
 
 /// Why paints cannot be blended.
@@ -156,7 +183,7 @@ impl Blend {
             return Err(BlendError::Paints(ingredients.len()));
         }
         let hashes: Vec<String> = ingredients
-            .iter()
+            .par_iter()
             .map(|i| i.paint.content_hash().to_hex().to_string())
             .collect();
         let mut canonical: Vec<usize> = (0..ingredients.len()).collect();

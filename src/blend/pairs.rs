@@ -48,9 +48,12 @@ pub(super) fn pair_reports(
     let mut reports = Vec::new();
     for i in 0..order.len() {
         for j in i + 1..order.len() {
-            let costs = slices.iter().map(|s| s.cost_of_pair(i, j, Cost::Distance));
+            let costs: Vec<f64> = slices
+                .par_iter()
+                .map(|s| s.cost_of_pair(i, j, Cost::Distance))
+                .collect();
             #[allow(clippy::cast_precision_loss)] // a count of slices
-            let mean_cost = costs.sum::<f64>() / count.max(1) as f64;
+            let mean_cost = costs.iter().sum::<f64>() / count.max(1) as f64;
             let gaps: Vec<f64> = if order.len() == 2 && settings.cost == Cost::Distance {
                 slices.iter().map(|s| s.gap).collect()
             } else {
@@ -60,10 +63,7 @@ pub(super) fn pair_reports(
                     .step_by(step)
                     .map_init(Bench::default, |bench, k| {
                         bound_alone([paints[i], paints[j]], grid.angles(k), bench)
-                            .map(|bound| {
-                                let cost = slices[k].cost_of_pair(i, j, Cost::Distance);
-                                (cost - bound).max(0.0)
-                            })
+                            .map(|bound| (costs[k] - bound).max(0.0))
                             .map_err(|source| grid.refused(k, source))
                     })
                     .collect::<Result<_, _>>()?

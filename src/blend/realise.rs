@@ -8,9 +8,10 @@
 //! (Golla and Klein 2018, eq. 14-15, 4.4). Weights may leave 0..1 and need not sum to 1. The sums themselves stand in
 //! `boxes`; base and lobes have their own files.
 
-use super::boxes::{Mixed, mix_boxes};
+use super::boxes::mix_boxes;
 use super::clamp::{Clamp, Ledger};
-use super::{Blend, BlendedFlakes, RealisationWeights, WeightError, base, lobes};
+use super::geometric::geometric_mean;
+use super::{Blend, BlendedFlakes, Boxes, RealisationWeights, WeightError, base, lobes};
 use crate::paint::{CarPaint, FlakeTexture, Flakes};
 
 /// A synthesised paint and the account of what had to be clamped.
@@ -30,11 +31,33 @@ impl Blend {
     /// # Errors
     ///
     /// [`WeightError`] for a list of another length than there are paints, or a weight that is not finite.
-    ///
-    /// # Panics
-    ///
-    /// Never: a blend has at least two paints.
     pub fn realise(&self, wanted: &RealisationWeights) -> Result<Realised, WeightError> {
+        self.realised_in(wanted, Boxes::default())
+    }
+
+    /// The same in the memory of a realisation that is needed no more: for who moves weights to and fro, and whom new
+    /// memory for every step would cost more than the step.
+    ///
+    /// # Errors
+    ///
+    /// As [`Blend::realise`].
+    pub fn realise_over(
+        &self,
+        wanted: &RealisationWeights,
+        old: Realised,
+    ) -> Result<Realised, WeightError> {
+        let lists = old.paint.flakes.map(|old| Boxes {
+            lower: old.lower,
+            upper: old.upper,
+        });
+        self.realised_in(wanted, lists.unwrap_or_default())
+    }
+
+    fn realised_in(
+        &self,
+        wanted: &RealisationWeights,
+        lists: Boxes,
+    ) -> Result<Realised, WeightError> {
         wanted.check(self.ingredients().map(|(name, _)| name))?;
         let by_hash = |given: &[f64]| {
             let mut weights = vec![0.0; given.len()];
@@ -53,10 +76,14 @@ impl Blend {
             diffuse: base::diffuse(&self.paints, &base_weights, &mut ledger),
             lobes: lobes::blend(&places, &base_weights, &mut ledger),
             color_table: base::color_table(&self.paints, &base_weights, &mut ledger),
-            flakes: self
-                .flakes
-                .as_ref()
-                .map(|f| f.blend(&lightness, &color, wanted.flake_saturation, &mut ledger)),
+            flakes: self.flakes.as_ref().map(|f| {
+                f.blend(
+                    [&lightness, &color],
+                    wanted.flake_saturation,
+                    lists,
+                    &mut ledger,
+                )
+            }),
         };
         let weight_sums = [&base_weights, &lightness, &color].map(|w| w.iter().sum());
         Ok(Realised {
@@ -68,12 +95,12 @@ impl Blend {
 }
 
 impl BlendedFlakes {
-    /// The flakes at these weights, in the paints' order.
+    /// The flakes at these weights of lightness and color, in the paints' order; their boxes take the place of others.
     fn blend(
         &self,
-        lightness: &[f64],
-        color: &[f64],
+        [lightness, color]: [&[f64]; 2],
         saturation: f64,
+        mut boxes: Boxes,
         ledger: &mut Ledger,
     ) -> Flakes {
         let axes: Vec<[f64; 3]> = lightness
@@ -81,33 +108,24 @@ impl BlendedFlakes {
             .zip(color)
             .map(|(&l, &c)| [l, c * saturation, c * saturation])
             .collect();
-        let Mixed {
-            lower,
-            upper,
-            account,
-        } = mix_boxes(&self.boxes, &axes);
-        account.close(3 * self.probability.len(), ledger);
+        mix_boxes(self, &axes, &mut boxes).close(3 * self.probability.len(), ledger);
         Flakes {
             theta_h: self.theta_h.clone(),
             theta_d: self.theta_d.clone(),
             offsets: self.offsets.clone(),
             probability: self.probability.clone(),
-            lower,
-            upper,
+            lower: boxes.lower,
+            upper: boxes.upper,
             texture: self.texture(lightness, ledger),
         }
     }
 
     /// Texel, grain and lifetime follow the weights of the lightness: they are how the sparkle looks.
     fn texture(&self, weights: &[f64], ledger: &mut Ledger) -> FlakeTexture {
-        let mix = |get: &dyn Fn(&FlakeTexture) -> f64| -> f64 {
-            self.textures
-                .iter()
-                .zip(weights)
-                .map(|(t, w)| w * get(t))
-                .sum()
+        let mix = |get: &dyn Fn(&FlakeTexture) -> f64| {
+            geometric_mean(self.textures.iter().map(get), weights)
         };
-        let mut angle = |field: &str, get: &dyn Fn(&FlakeTexture) -> f64| {
+        let mut angle = |field: &'static str, get: &dyn Fn(&FlakeTexture) -> f64| {
             ledger.hold(field, mix(get), 0.01, 1e4)
         };
         let lifetime_deg = [

@@ -19,8 +19,8 @@ fn paint(seed: u32, theta_h: &[f64], theta_d: &[f64]) -> CarPaint {
     let mut flakes = Flakes {
         theta_h: grid(theta_h),
         theta_d: grid(theta_d),
-        offsets: vec![0],
-        probability: Vec::new(),
+        offsets: vec![0].into(),
+        probability: vec![].into(),
         lower: Vec::new(),
         upper: Vec::new(),
         texture: FlakeTexture {
@@ -275,11 +275,37 @@ fn next_to_weight_one_it_is_the_same_to_a_millionth() {
 }
 
 #[test]
+fn a_realisation_over_an_old_one_is_that_of_new_memory() {
+    let pair = blend(&[&paint(6, H, D), &paint(7, &[0.0, 20.0], D)]);
+    let mut solid = paint(11, H, D);
+    solid.flakes = None;
+    let other = blend(&[&paint(10, &[0.0], D), &solid]);
+    let weights = |w: f64| RealisationWeights::even(vec![w, 1.0 - w]);
+    let mut old = other.realise(&weights(0.3)).expect("realised");
+    for w in [0.5, 1.0, 1.4, -0.7, 9.0, 0.0] {
+        old = pair.realise_over(&weights(w), old).expect("realised");
+        assert_eq!(old, pair.realise(&weights(w)).expect("realised"));
+    }
+    assert!(pair.realise_over(&weights(f64::NAN), old).is_err());
+}
+
+#[test]
+fn realisations_share_what_no_weight_changes() {
+    let pair = blend(&[&paint(6, H, D), &paint(7, H, D)]);
+    let [one, other] = [0.2, 1.3].map(|w| at(&pair, &[w, 1.0 - w]).flakes.expect("has flakes"));
+    assert!(std::ptr::eq(
+        one.probability.as_ptr(),
+        other.probability.as_ptr()
+    ));
+    assert!(std::ptr::eq(one.offsets.as_ptr(), other.offsets.as_ptr()));
+}
+
+#[test]
 fn the_halfway_of_two_spikes_is_a_spike() {
     let spike = |l: f32| {
         let mut paint = paint(8, &[0.0], &[0.0]);
         let flakes = paint.flakes.as_mut().expect("has flakes");
-        (flakes.offsets, flakes.probability) = (vec![0, 1], vec![1.0]);
+        (flakes.offsets, flakes.probability) = (vec![0, 1].into(), vec![1.0].into());
         (flakes.lower, flakes.upper) = (vec![[l, 0.0, 0.0]], vec![[l, 0.0, 0.0]]);
         paint
     };
@@ -288,7 +314,7 @@ fn the_halfway_of_two_spikes_is_a_spike() {
         .expect("has flakes");
     assert_eq!(
         (half.lower, half.probability),
-        (vec![[50.0, 0.0, 0.0]], vec![1.0])
+        (vec![[50.0, 0.0, 0.0]], vec![1.0].into())
     );
 }
 

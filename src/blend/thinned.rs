@@ -1,6 +1,7 @@
 //! A blend with fewer angles: a sample of the same work.
 
 use super::{Blend, BlendedFlakes, Boxes};
+use crate::paint::SharedList;
 
 impl Blend {
     /// The slices at these grid indices of θh and θd alone. Reports stay those of the whole.
@@ -42,10 +43,11 @@ impl BlendedFlakes {
         let mut kept = Self {
             theta_h: self.theta_h.at(theta_h),
             theta_d: self.theta_d.at(theta_d),
-            offsets: vec![0],
-            probability: Vec::new(),
+            offsets: vec![0].into(),
+            probability: SharedList::default(),
             boxes: vec![Boxes::default(); self.boxes.len()],
             textures: self.textures.clone(),
+            reach: self.reach,
         };
         for &h in theta_h {
             for &d in theta_d {

@@ -1,6 +1,8 @@
 //! `carpaint ingest`: a measurement becomes a `.paint`.
 
+use std::cell::RefCell;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -10,7 +12,7 @@ use super::profile::{ProfileArgs, TargetArgs};
 use super::progress::Progress;
 use super::{output, show};
 use crate::measurement::{Layout, ReadOptions, ThetaHSpacing};
-use crate::workshop::{IngestOptions, Source, Work, WorkshopError, find, ingest};
+use crate::workshop::{IngestOptions, Source, Work, WorkshopError, find, ingest_in_stages};
 
 /// Fit a measurement and keep it as a .paint.
 ///
@@ -31,6 +33,9 @@ pub struct Ingest {
     /// File to write.
     #[arg(long, value_name = "P.paint")]
     out: PathBuf,
+    /// Write the seconds each stage took.
+    #[arg(long, value_name = "T.json")]
+    timings: Option<PathBuf>,
 }
 
 /// How a measurement is read.
@@ -123,9 +128,22 @@ impl Ingest {
             options.profile = *picked.profile();
         }
         let progress = Progress::new("ingesting");
-        let paint = ingest(&path, &options, &|share| progress.at(share))?;
+        let start = Instant::now();
+        let stages = RefCell::new(Vec::new());
+        let ended = |stage| stages.borrow_mut().push((stage, start.elapsed()));
+        let paint = ingest_in_stages(&path, &options, &|share| progress.at(share), &ended)?;
         output::replace(&self.out, &paint.to_bytes())?;
+        ended("write");
         drop(progress);
+        if let Some(timings) = &self.timings {
+            let (mut seconds, mut before) = (serde_json::Map::new(), Duration::ZERO);
+            for (stage, end) in stages.take() {
+                seconds.insert(stage.to_owned(), json!((end - before).as_secs_f64()));
+                before = end;
+            }
+            seconds.insert("total".to_owned(), json!(before.as_secs_f64()));
+            output::replace(timings, json!(seconds).to_string().as_bytes())?;
+        }
         if json {
             return output::print_json(
                 &json!({ "out": self.out, "profile": options.profile.name(), "picked": picked, "paint": show::summary(&paint) }),

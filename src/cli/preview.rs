@@ -25,7 +25,7 @@ pub struct Preview {
     input: String,
     #[command(flatten)]
     weights: WeightArgs,
-    /// What the paint is on.
+    /// What the paint is on, 40 mm across and near enough to tell its flakes.
     #[arg(
         long,
         value_name = "SHAPE",

@@ -31,7 +31,8 @@ impl FromStr for WeightList {
 /// Which realisation of a blend.
 #[derive(Args, Clone, Debug, Default)]
 pub struct WeightArgs {
-    /// One weight per paint, in the order they were blended: 0.5,0.5. May lie outside 0 to 1.
+    /// One weight per paint, in the order they were blended: 0.5,0.5. May lie outside 0 to 1, as -0.2,1.2 beyond the
+    /// second. A mixture's weights sum to 1; others add or take away light, flakes' lightness and refraction.
     #[arg(long, value_name = "W", allow_hyphen_values = true)]
     pub weights: Option<WeightList>,
     /// Weights of coat, diffuse, lobes and color table alone.

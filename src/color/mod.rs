@@ -6,12 +6,14 @@
 //!
 //! Left to others: tone mapping for a screen (`render`), spectra (`measurement`).
 
+mod adaptation;
 mod difference;
 mod lab;
 mod rgb;
 mod transfer;
 mod white;
 
+pub use adaptation::adapted;
 pub use difference::ciede2000;
 pub(crate) use lab::{KNEE, expand, expand_f32};
 pub use lab::{Lab, ReadingLab};

@@ -67,7 +67,7 @@ fn textures(
         out.slices(flakes)?;
         let (lower, upper) = stacked(&boxes, width);
         out.corners(&lower, &upper, width, settings.precision)?;
-        out.probability(flakes, width, settings.alias)?;
+        out.draws(flakes, width, settings.alias)?;
         out.random(flakes)?;
     }
     Ok(out)

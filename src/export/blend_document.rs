@@ -1,10 +1,8 @@
 //! `material.json` of a blend: each paint's numbers as they are to be summed, and what they have in common.
 
 use serde::Serialize;
-use serde_json::{Map, Value};
 
-use super::clamp::Clamped;
-use super::document::{COLOR_SPACE, Carrier, MODEL, texture_entries};
+use super::document::{COLOR_SPACE, Carrier, MODEL, Written};
 use super::numbers::{self, ANY, Number};
 use super::textures::Textures;
 use super::{About, ExportError, ExportSettings};
@@ -17,9 +15,9 @@ const VERSION: u32 = 1;
 const BLENDING: &str = "Weights w are one number a paint, in the order of `paints`: one list for the base (coat, diffuse, lobes, \
      color_table), one for the flakes' lightness, one for their color; inside or beyond 0 to 1. Linear: X = sum of w X_m for ior and \
      roughness of the coat (an index of 1 is no coat), diffuse, weight and f0 of each lobe, CIELAB of each color table node \
-     (then to linear sRGB, then between angles), by lightness for the L of both corners of each box, texel_um, grain_um, \
-     lifetime_deg and persistence_deg, by color and times the saturation for a and b of both corners. alpha of a lobe = product of \
-     alpha_m^(w/sum of w), equal exponents where |sum of w| < 1e-9. Corners that change places are put in order. Probabilities never \
+     (then to linear sRGB, then between angles), by lightness for the L of both corners of each box, by color and \
+     times the saturation for a and b of both corners. Geometric: X = product of X_m^(w/sum of w) for the alpha of a lobe, and by \
+     lightness for texel_um, grain_um, lifetime_deg and persistence_deg; equal exponents where |sum of w| < 1e-9. Corners that change places are put in order. Probabilities never \
      change. Bounds: ior 1 to 4, roughness 0 to 1, diffuse and weights 0 to 1000, alpha 0.0001 to 10, f0 0 to 1, Lab -2000 to 2000 an \
      axis, texel_um 0.001 to 1e5, grain_um 0.001 to 1e6, degrees 0.01 to 1e4. The mean of a slice depends on the weights: sum of \
      probability times the mean linear sRGB over each box, in 1/sr (over pi), colors uniform in the box; carpaint.js has it in \
@@ -39,12 +37,8 @@ struct Document<'a> {
     paints: Vec<PaintEntry<'a>>,
     color_table: AnglesEntry<'a>,
     flakes: Option<FlakesEntry<'a>>,
-    settings: ExportSettings,
-    textures: Map<String, Value>,
-    shader: &'static str,
-    clamped: &'a [Clamped],
-    report: &'a Value,
-    documentation: Value,
+    #[serde(flatten)]
+    written: Written<'a>,
 }
 
 #[derive(Serialize)]
@@ -106,6 +100,13 @@ pub(super) fn blend_document(
         },
         flakes: part.texture,
     });
+    let explained = [
+        PAINTS,
+        numbers::ANGLES,
+        numbers::TEXTURES,
+        numbers::REPORT,
+        numbers::PROVENANCE,
+    ];
     let table = &even.color_table;
     let document = Document {
         format: "carpaint blend",
@@ -137,18 +138,7 @@ pub(super) fn blend_document(
             },
             corner_rounding_lab: textures.corner_rounding_lab,
         }),
-        settings: *settings,
-        textures: texture_entries(textures, &Carrier::Files)?,
-        shader: "carpaint.glsl",
-        clamped: &textures.clamped,
-        report: &about.report,
-        documentation: numbers::documentation(&[
-            PAINTS,
-            numbers::ANGLES,
-            numbers::TEXTURES,
-            numbers::REPORT,
-            numbers::PROVENANCE,
-        ]),
+        written: Written::of(about, settings, textures, &Carrier::Files, &explained)?,
     };
     Ok(serde_json::to_vec_pretty(&document)?)
 }

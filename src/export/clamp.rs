@@ -8,6 +8,7 @@ use half::slice::HalfFloatSliceExt;
 use serde::Serialize;
 
 use super::ExportError;
+use crate::paint::largest_magnitude;
 
 /// Largest magnitude that a half holds.
 const HALF_MAX: f32 = 65504.0;
@@ -30,10 +31,11 @@ const HALF_MIN: f32 = 6.103_515_6e-5;
 
 /// Refuses numbers that are not finite.
 pub(super) fn finite(what: &'static str, values: &[f32]) -> Result<(), ExportError> {
-    values
-        .iter()
-        .position(|v| !v.is_finite())
-        .map_or(Ok(()), |index| Err(ExportError::NotFinite { what, index }))
+    if largest_magnitude(values).is_finite() {
+        return Ok(());
+    }
+    let index = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
+    Err(ExportError::NotFinite { what, index })
 }
 
 /// The nearer of 0 and [`HALF_MIN`] for a number between them.
@@ -45,13 +47,63 @@ fn without_subnormals(value: f32) -> f32 {
     }
 }
 
+/// Numbers as halves, and the largest difference that makes to one of them.
+#[derive(Debug)]
+pub(super) struct Halves {
+    pub list: Vec<f16>,
+    pub rounding: f32,
+}
+
+impl Halves {
+    /// No number.
+    pub const fn none() -> Self {
+        Self {
+            list: Vec::new(),
+            rounding: 0.0,
+        }
+    }
+}
+
+/// Numbers that are converted at a time: they and their halves stay in the nearest cache.
+const BLOCK: usize = 1024;
+
 /// Halves of finite numbers, clamped to ±65504, none subnormal. Adds to `clamped` when the clamp bit.
 pub(super) fn halves(
     what: &'static str,
     values: &mut [f32],
     clamped: &mut Vec<Clamped>,
-) -> Result<Vec<f16>, ExportError> {
+) -> Result<Halves, ExportError> {
     finite(what, values)?;
+    let mut list = vec![f16::ZERO; values.len()];
+    let (mut rounding, mut back) = (0.0_f32, [0.0; BLOCK]);
+    for (values, list) in values.chunks_mut(BLOCK).zip(list.chunks_mut(BLOCK)) {
+        if largest_magnitude(values) > HALF_MAX {
+            hold(what, values, clamped);
+        }
+        list.convert_from_f32_slice(values);
+        let mut small = false;
+        for value in &*values {
+            small |= (value.abs() < HALF_MIN) & (*value != 0.0);
+        }
+        if small {
+            for (half, value) in list.iter_mut().zip(&*values) {
+                if value.abs() < HALF_MIN {
+                    *half = f16::from_f32(without_subnormals(*value));
+                }
+            }
+        }
+        let back = &mut back[..values.len()];
+        list.convert_to_f32_slice(back);
+        for (back, value) in back.iter_mut().zip(&*values) {
+            *back -= value;
+        }
+        rounding = rounding.max(largest_magnitude(back));
+    }
+    Ok(Halves { list, rounding })
+}
+
+/// Holds numbers to ±65504 and keeps the account.
+fn hold(what: &'static str, values: &mut [f32], clamped: &mut Vec<Clamped>) {
     let (mut count, mut farthest) = (0, 0.0_f32);
     for value in values.iter_mut().filter(|v| v.abs() > HALF_MAX) {
         count += 1;
@@ -60,30 +112,20 @@ pub(super) fn halves(
         }
         *value = value.clamp(-HALF_MAX, HALF_MAX);
     }
-    if count > 0 {
-        if let Some(known) = clamped.iter_mut().find(|c| c.what == what) {
-            known.count += count;
-            if f64::from(farthest.abs()) > known.farthest.abs() {
-                known.farthest = f64::from(farthest);
-            }
-        } else {
-            let (farthest, limit) = (f64::from(farthest), f64::from(HALF_MAX));
-            clamped.push(Clamped {
-                what,
-                count,
-                farthest,
-                limit,
-            });
+    if let Some(known) = clamped.iter_mut().find(|c| c.what == what) {
+        known.count += count;
+        if f64::from(farthest.abs()) > known.farthest.abs() {
+            known.farthest = f64::from(farthest);
         }
+    } else {
+        let (farthest, limit) = (f64::from(farthest), f64::from(HALF_MAX));
+        clamped.push(Clamped {
+            what,
+            count,
+            farthest,
+            limit,
+        });
     }
-    let mut out = vec![f16::ZERO; values.len()];
-    out.convert_from_f32_slice(values);
-    for (half, value) in out.iter_mut().zip(&*values) {
-        if value.abs() < HALF_MIN {
-            *half = f16::from_f32(without_subnormals(*value));
-        }
-    }
-    Ok(out)
 }
 
 #[cfg(test)]
@@ -96,9 +138,10 @@ mod tests {
         let mut values = [1.0, 70000.0, -1e9, 65504.0];
         let out = halves("means", &mut values, &mut clamped).expect("finite");
         assert_eq!(
-            out.iter().map(|h| h.to_f32()).collect::<Vec<_>>(),
+            out.list.iter().map(|h| h.to_f32()).collect::<Vec<_>>(),
             [1.0, 65504.0, -65504.0, 65504.0]
         );
+        assert_eq!(out.rounding, 0.0);
         assert_eq!(
             clamped,
             [Clamped {
@@ -129,9 +172,22 @@ mod tests {
         let mut values = [1e-45, 3.05e-5, -3.06e-5, 6.1e-5, smallest, -1e-30, 7e-5];
         let out = halves("means", &mut values, &mut Vec::new()).expect("finite");
         let want = [0.0, 0.0, -smallest, smallest, smallest, 0.0, 7e-5];
-        for (half, want) in out.iter().zip(want) {
+        for (half, want) in out.list.iter().zip(want) {
             assert_eq!(*half, f16::from_f32(want));
         }
+    }
+
+    #[test]
+    fn the_rounding_is_that_of_the_worst_number() {
+        // Halves next to 1000 are half a unit apart, over many blocks.
+        let mut values: Vec<f32> = (0..5000_u16).map(|k| f32::from(k) / 5.0).collect();
+        let written = halves("x", &mut values, &mut Vec::new()).expect("finite");
+        let worst = values
+            .iter()
+            .zip(&written.list)
+            .map(|(v, h)| (v - h.to_f32()).abs());
+        assert_eq!(written.rounding, worst.fold(0.0, f32::max));
+        assert!((0.19..=0.25).contains(&written.rounding));
     }
 
     #[test]
@@ -140,7 +196,9 @@ mod tests {
         let mut clamped = Vec::new();
         for value in [65504.1_f32, 65519.9, 65520.0, f32::MAX] {
             assert_eq!(
-                halves("x", &mut [value], &mut clamped).expect("finite"),
+                halves("x", &mut [value], &mut clamped)
+                    .expect("finite")
+                    .list,
                 [f16::MAX]
             );
         }

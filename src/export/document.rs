@@ -4,8 +4,9 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::clamp::Clamped;
+use super::numbers::{self, Number};
 use super::textures::{Entry, Textures};
-use super::{About, ExportError, ExportSettings, inverse_cdf, numbers};
+use super::{About, ExportError, ExportSettings, inverse_cdf};
 use crate::paint::{CarPaint, Lobe, Provenance, RandomTexture, cell_spacing};
 
 /// Version of the document's form.
@@ -34,14 +35,41 @@ pub(super) struct Document<'a> {
     lobes: &'a [Lobe],
     color_table: ColorTableEntry<'a>,
     flakes: Option<FlakesEntry<'a>>,
+    #[serde(flatten)]
+    written: Written<'a>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shader_source: Option<&'static str>,
+}
+
+/// What every document says of how it was written.
+#[derive(Serialize)]
+pub(super) struct Written<'a> {
     settings: ExportSettings,
     textures: Map<String, Value>,
     shader: &'static str,
     clamped: &'a [Clamped],
     report: &'a Value,
     documentation: Value,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    shader_source: Option<&'static str>,
+}
+
+impl<'a> Written<'a> {
+    /// The textures as they are carried, and the meaning of every number, by the lists of `numbers`.
+    pub fn of(
+        about: &'a About,
+        settings: &ExportSettings,
+        textures: &'a Textures,
+        carrier: &Carrier,
+        numbers: &[&[Number]],
+    ) -> Result<Self, ExportError> {
+        Ok(Self {
+            settings: *settings,
+            textures: texture_entries(textures, carrier)?,
+            shader: "carpaint.glsl",
+            clamped: &textures.clamped,
+            report: &about.report,
+            documentation: numbers::documentation(numbers),
+        })
+    }
 }
 
 #[derive(Serialize)]
@@ -101,6 +129,15 @@ pub(super) fn document(
     textures: &Textures,
     carrier: &Carrier,
 ) -> Result<Vec<u8>, ExportError> {
+    let explained = [
+        numbers::PAINT,
+        numbers::ANGLES,
+        numbers::GRAIN,
+        numbers::TEXTURES,
+        numbers::INVERSE_CDF,
+        numbers::REPORT,
+        numbers::PROVENANCE,
+    ];
     let table = &paint.color_table;
     let document = Document {
         format: "carpaint material",
@@ -142,27 +179,14 @@ pub(super) fn document(
                 mean_luminance_change: textures.slice_losses.iter().map(|loss| loss[1]).collect(),
             }),
         }),
-        settings: *settings,
-        textures: texture_entries(textures, carrier)?,
-        shader: "carpaint.glsl",
-        clamped: &textures.clamped,
-        report: &about.report,
-        documentation: numbers::documentation(&[
-            numbers::PAINT,
-            numbers::ANGLES,
-            numbers::GRAIN,
-            numbers::TEXTURES,
-            numbers::INVERSE_CDF,
-            numbers::REPORT,
-            numbers::PROVENANCE,
-        ]),
+        written: Written::of(about, settings, textures, carrier, &explained)?,
         shader_source: matches!(carrier, Carrier::Inline).then_some(super::SHADER),
     };
     Ok(serde_json::to_vec_pretty(&document)?)
 }
 
 /// What is told of each texture, by name.
-pub(super) fn texture_entries(
+fn texture_entries(
     textures: &Textures,
     carrier: &Carrier,
 ) -> Result<Map<String, Value>, ExportError> {

@@ -24,6 +24,14 @@ impl Plane<'_> {
         }
     }
 
+    /// How many numbers.
+    pub const fn len(&self) -> usize {
+        match self {
+            Self::Half(values) => values.len(),
+            Self::Float(values) => values.len(),
+        }
+    }
+
     const fn pixel_type(&self) -> u32 {
         match self {
             Self::Half(_) => 1,

@@ -12,7 +12,7 @@ use super::gltf_fit::{fit, loss};
 use super::gltf_material::{extras, material_json};
 use super::gltf_mesh::{Mesh, ball};
 use super::{About, ExportError, ExportSettings};
-use crate::paint::{CarPaint, RandomTexture, Reflectance};
+use crate::paint::{CarPaint, Flakes, RandomTexture, Reflectance};
 
 /// The GLB of a paint. Settings of textures do not change it: its lists are 32-bit, its pictures 8-bit.
 ///
@@ -27,6 +27,8 @@ pub fn glb(
     let reflectance = Reflectance::new(paint);
     let (mut material, mut report) = fit(&reflectance);
     let mut file = Builder::default();
+    let clusters = paint.flakes.as_ref().map_or(0, Flakes::clusters);
+    file.body.reserve(clusters * 28 + (512 << 10));
     let mut baked = None;
     if let Some(flakes) = &paint.flakes {
         let f0 = dielectric_f0(material.ior, material.specular_color);

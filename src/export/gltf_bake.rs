@@ -57,45 +57,65 @@ pub(super) fn bake(
     let width = tile.width() as usize;
     let baked = BakedSlice::of(reflectance, flakes);
     let facet = facets(reflectance, &baked, material, f0);
-    let mut all: Vec<Facet> = Vec::with_capacity(cells.len());
+    // Cells are wider than texels: most texels show the facet beside or above, and only its bytes are theirs.
+    let mut shown: Vec<u32> = Vec::with_capacity(cells.len());
+    let (mut all, mut areas): (Vec<Facet>, Vec<f64>) = (Vec::new(), Vec::new());
     for (k, &cell) in cells.iter().enumerate() {
-        // Cells are wider than texels: most repeat the texel beside or above.
         let beside = (k % width > 0).then(|| k - 1);
         let known = [beside, k.checked_sub(width)]
             .into_iter()
             .flatten()
             .find(|&at| cells[at] == cell);
-        all.push(known.map_or_else(|| facet(cell), |at| all[at]));
+        let own = known.map_or(all.len(), |at| shown[at] as usize);
+        if own == all.len() {
+            all.push(facet(cell));
+            areas.push(0.0);
+        }
+        areas[own] += 1.0;
+        #[allow(clippy::cast_possible_truncation)] // no more facets than texels of a tile
+        shown.push(own as u32);
     }
     let peak = all.iter().flat_map(|f| f.f0).fold(1e-6_f32, f32::max);
     let curve = SrgbCurve::new();
-    let mut pixels = Vec::with_capacity(3 * all.len());
     let mut sum = [0.0; 3];
-    for f in &all {
-        for k in 0..3 {
-            let byte = curve.byte(f.f0[k] / peak);
-            sum[k] += f64::from(curve.light[usize::from(byte)]);
-            pixels.push(byte);
-        }
-    }
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0..=255
-    let normals: Vec<u8> = all
+    let colors: Vec<[u8; 3]> = all
         .iter()
-        .flat_map(|f| f.normal.map(|v| (127.5 + 127.5 * v).round() as u8))
+        .zip(&areas)
+        .map(|(f, area)| {
+            let bytes = f.f0.map(|light| curve.byte(light / peak));
+            for k in 0..3 {
+                sum[k] += area * f64::from(curve.light[usize::from(bytes[k])]);
+            }
+            bytes
+        })
+        .collect();
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0..=255
+    let normals: Vec<[u8; 3]> = all
+        .iter()
+        .map(|f| f.normal.map(|v| (127.5 + 127.5 * v).round() as u8))
         .collect();
     #[allow(clippy::cast_precision_loss)] // a tile's texels
-    let mean = sum.map(|s| s / all.len() as f64);
-    let sample = all
+    let mean = sum.map(|s| s / shown.len() as f64);
+    let normal_sample = shown
         .iter()
-        .step_by(all.len().div_ceil(64).max(1))
-        .map(|f| f.normal.map(f64::from))
+        .step_by(shown.len().div_ceil(64).max(1))
+        .map(|&own| all[own as usize].normal.map(f64::from))
         .collect();
     let height = tile.height() as usize;
+    let picture = |of_facet: &[[u8; 3]]| {
+        let texels: Vec<[u8; 3]> = shown.iter().map(|&own| of_facet[own as usize]).collect();
+        png(
+            width,
+            height,
+            texels.as_flattened(),
+            ExtendedColorType::Rgb8,
+        )
+    };
     Ok(Baked {
-        f0: png(width, height, &pixels, ExtendedColorType::Rgb8)?,
+        f0: picture(&colors)?,
         f0_factor: std::array::from_fn(|k| if mean[k] > 1e-9 { f0[k] / mean[k] } else { 0.0 }),
-        normals: png(width, height, &normals, ExtendedColorType::Rgb8)?,
-        normal_sample: sample,
+        normals: picture(&normals)?,
+        normal_sample,
     })
 }
 

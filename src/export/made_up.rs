@@ -18,8 +18,8 @@ pub(super) fn metallic(rows: u32, columns: u32, clusters: u32) -> CarPaint {
     let mut flakes = Flakes {
         theta_h,
         theta_d,
-        offsets: vec![0],
-        probability: vec![],
+        offsets: vec![0].into(),
+        probability: vec![].into(),
         lower: vec![],
         upper: vec![],
         texture: FlakeTexture {

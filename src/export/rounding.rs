@@ -3,7 +3,7 @@
 use half::f16;
 
 use super::Precision;
-use super::textures::Range8;
+use super::corners::Range8;
 use crate::paint::Flakes;
 
 /// The rounding of corner textures.

@@ -6,17 +6,15 @@
 
 use std::sync::OnceLock;
 
-use half::f16;
-use half::slice::HalfFloatSliceExt;
 use image::ExtendedColorType;
 use serde::Serialize;
 
-use super::clamp::{Clamped, finite, halves};
+use super::clamp::{Clamped, Halves, finite, halves};
 use super::exr_file::{Plane, exr};
 use super::png_file::png;
-use super::{ExportError, ExportSettings, Precision, alias, inverse_cdf};
-use crate::color::{LinearRgb, luminance};
-use crate::paint::{CarPaint, Flakes, RandomTexture, cumulative, mean_color};
+use super::{ExportError, ExportSettings, Precision};
+use crate::color::LinearRgb;
+use crate::paint::{CarPaint, Flakes, RandomTexture};
 
 /// Largest number of clusters: their numbers are exact in a 32-bit float.
 pub(super) const MAX_CLUSTERS: usize = 1 << 24;
@@ -52,6 +50,26 @@ pub(super) struct Entry {
     pub about: &'static str,
 }
 
+impl Entry {
+    /// Texels that are the values themselves.
+    pub fn plain(
+        [width, height]: [usize; 2],
+        channels: &'static str,
+        kind: &'static str,
+        about: &'static str,
+    ) -> Self {
+        Self {
+            width,
+            height,
+            channels,
+            kind,
+            scale: None,
+            offset: None,
+            about,
+        }
+    }
+}
+
 /// All textures of a paint, and what was lost on the way into them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Textures {
@@ -60,6 +78,14 @@ pub(super) struct Textures {
     pub corner_rounding_lab: f32,
     pub slice_losses: Vec<[f32; 2]>,
     pub inverse_cdf_blocks: usize,
+}
+
+/// Three planes as a file.
+pub(super) struct Planes {
+    /// Its bytes and the type of its numbers.
+    pub file: (Vec<u8>, &'static str),
+    /// Largest difference between a number and what a reader gets back.
+    pub rounding: f32,
 }
 
 impl Textures {
@@ -98,63 +124,62 @@ impl Textures {
         about: &'static str,
     ) -> Result<(), ExportError> {
         #[allow(clippy::cast_possible_truncation)] // texel precision
-        let mut planes: [Vec<f32>; 3] =
-            std::array::from_fn(|k| nodes.iter().map(|c| c[k] as f32).collect());
+        let planes = std::array::from_fn(|k| nodes.iter().map(|c| c[k] as f32).collect());
         let height = nodes.len() / width;
-        let (bytes, kind) = if precision == Precision::F32 {
-            for plane in &planes {
-                finite(name, plane)?;
-            }
-            let [r, g, b] = &planes;
-            (
-                exr(
-                    width,
-                    height,
-                    &[
-                        ("B", Plane::Float(b)),
-                        ("G", Plane::Float(g)),
-                        ("R", Plane::Float(r)),
-                    ],
-                ),
-                "f32",
-            )
-        } else {
-            let mut half = [const { Vec::new() }; 3];
-            for (half, plane) in half.iter_mut().zip(&mut planes) {
-                *half = halves(name, plane, &mut self.clamped)?;
-            }
-            let [r, g, b] = &half;
-            (
-                exr(
-                    width,
-                    height,
-                    &[
-                        ("B", Plane::Half(b)),
-                        ("G", Plane::Half(g)),
-                        ("R", Plane::Half(r)),
-                    ],
-                ),
-                "f16",
-            )
-        };
+        let (bytes, kind) = self.three_planes(name, width, planes, precision)?.file;
         self.push(
             name,
             "exr",
             bytes,
-            Entry {
-                width,
-                height,
-                channels: "RGB",
-                kind,
-                scale: None,
-                offset: None,
-                about,
-            },
+            Entry::plain([width, height], "RGB", kind, about),
         );
         Ok(())
     }
 
-    fn push(&mut self, name: &'static str, extension: &str, bytes: Vec<u8>, entry: Entry) {
+    /// The file of three planes of numbers, as halves unless they are to be whole.
+    pub(super) fn three_planes(
+        &mut self,
+        name: &'static str,
+        width: usize,
+        mut planes: [Vec<f32>; 3],
+        precision: Precision,
+    ) -> Result<Planes, ExportError> {
+        let file = |planes: [Plane<'_>; 3]| {
+            let height = planes[0].len() / width;
+            let [r, g, b] = planes;
+            exr(width, height, &[("B", b), ("G", g), ("R", r)])
+        };
+        if precision == Precision::F32 {
+            for plane in &planes {
+                finite(name, plane)?;
+            }
+            let bytes = file(planes.each_ref().map(|plane| Plane::Float(plane)));
+            return Ok(Planes {
+                file: (bytes, "f32"),
+                rounding: 0.0,
+            });
+        }
+        let mut written = [const { Halves::none() }; 3];
+        for (written, plane) in written.iter_mut().zip(&mut planes) {
+            *written = halves(name, plane, &mut self.clamped)?;
+        }
+        let rounding = written
+            .iter()
+            .fold(0.0, |worst, own| f32::max(worst, own.rounding));
+        let bytes = file(written.each_ref().map(|own| Plane::Half(&own.list)));
+        Ok(Planes {
+            file: (bytes, "f16"),
+            rounding,
+        })
+    }
+
+    pub(super) fn push(
+        &mut self,
+        name: &'static str,
+        extension: &str,
+        bytes: Vec<u8>,
+        entry: Entry,
+    ) {
         self.list.push(Texture {
             name,
             file: format!("{name}.{extension}"),
@@ -163,7 +188,7 @@ impl Textures {
         });
     }
 
-    fn floats(
+    pub(super) fn floats(
         &mut self,
         name: &'static str,
         width: usize,
@@ -181,15 +206,7 @@ impl Textures {
         let height = planes[0].1.len() / width;
         let bytes = exr(width, height, &channels);
         let channels = if planes.len() == 1 { "R" } else { "RG" };
-        let entry = Entry {
-            width,
-            height,
-            channels,
-            kind: "f32",
-            scale: None,
-            offset: None,
-            about,
-        };
+        let entry = Entry::plain([width, height], channels, "f32", about);
         self.push(name, "exr", bytes, entry);
         Ok(())
     }
@@ -222,7 +239,10 @@ impl Textures {
             });
         }
         let width = cluster_width(clusters);
-        let (means, luminances) = means(flakes);
+        let mut luminances = Vec::with_capacity(clusters);
+        let means: Vec<LinearRgb> = (0..flakes.slices())
+            .map(|k| flakes.slice_at(k).mean_of_boxes(|y| luminances.push(y)))
+            .collect();
         let about = "mean of every slice in 1/sr, linear sRGB; column theta_d, row theta_h";
         self.colors(
             "slice_means",
@@ -233,28 +253,11 @@ impl Textures {
         )?;
         self.slices(flakes)?;
         self.corners(&flakes.lower, &flakes.upper, width, settings.precision)?;
-        self.probability(flakes, width, settings.alias)?;
+        self.draws(flakes, width, settings.alias)?;
         if settings.inverse_cdf {
             self.inverse_cdf(flakes, &luminances)?;
         }
         self.random(flakes)
-    }
-
-    /// How clusters are drawn: cumulative probability, and the alias table where it is wanted.
-    pub(super) fn probability(
-        &mut self,
-        flakes: &Flakes,
-        width: usize,
-        alias: bool,
-    ) -> Result<(), ExportError> {
-        let mut cumulative = cumulative(flakes);
-        cumulative.resize(flakes.clusters().div_ceil(width) * width, 1.0);
-        let about = "cumulative probability of every cluster within its slice";
-        self.floats("cumulative", width, &[("R", &cumulative)], about)?;
-        if alias {
-            self.alias(flakes, width)?;
-        }
-        Ok(())
     }
 
     pub(super) fn slices(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
@@ -278,163 +281,6 @@ impl Textures {
         )
     }
 
-    /// Boxes in rows of `width`.
-    pub(super) fn corners(
-        &mut self,
-        lower: &[[f32; 3]],
-        upper: &[[f32; 3]],
-        width: usize,
-        precision: Precision,
-    ) -> Result<(), ExportError> {
-        let about_lower =
-            "corner of smallest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
-        let about_upper =
-            "corner of largest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
-        let texels = lower.len().div_ceil(width) * width;
-        let height = texels / width;
-        let range = Range8::of(lower, upper);
-        let both = [
-            ("corners_lower", lower, about_lower),
-            ("corners_upper", upper, about_upper),
-        ];
-        for (name, corners, about) in both {
-            let entry = |kind| Entry {
-                width,
-                height,
-                channels: "RGB",
-                kind,
-                scale: None,
-                offset: None,
-                about,
-            };
-            if precision == Precision::Eight {
-                finite(name, corners.as_flattened())?;
-                let (pixels, rounding) = range.quantise(corners, texels);
-                self.corner_rounding_lab = self.corner_rounding_lab.max(rounding);
-                let bytes = png(width, height, &pixels, ExtendedColorType::Rgb8)?;
-                let (scale, offset) = (Some(range.scale), Some(range.offset));
-                self.push(
-                    name,
-                    "png",
-                    bytes,
-                    Entry {
-                        scale,
-                        offset,
-                        ..entry("unorm8")
-                    },
-                );
-                continue;
-            }
-            let mut planes: [Vec<f32>; 3] = std::array::from_fn(|k| {
-                let mut plane: Vec<f32> = Vec::with_capacity(texels);
-                plane.extend(corners.iter().map(|c| c[k]));
-                plane.resize(texels, 0.0);
-                plane
-            });
-            if precision == Precision::F32 {
-                for plane in &planes {
-                    finite(name, plane)?;
-                }
-                let [l, a, b] = &planes;
-                let channels = [
-                    ("B", Plane::Float(b)),
-                    ("G", Plane::Float(a)),
-                    ("R", Plane::Float(l)),
-                ];
-                self.push(name, "exr", exr(width, height, &channels), entry("f32"));
-                continue;
-            }
-            let mut half = [const { Vec::new() }; 3];
-            for (half, plane) in half.iter_mut().zip(&mut planes) {
-                *half = halves(name, plane, &mut self.clamped)?;
-                self.corner_rounding_lab = self.corner_rounding_lab.max(rounding(half, plane));
-            }
-            let [l, a, b] = &half;
-            let channels = [
-                ("B", Plane::Half(b)),
-                ("G", Plane::Half(a)),
-                ("R", Plane::Half(l)),
-            ];
-            self.push(name, "exr", exr(width, height, &channels), entry("f16"));
-        }
-        Ok(())
-    }
-
-    fn alias(&mut self, flakes: &Flakes, width: usize) -> Result<(), ExportError> {
-        let mut builder = alias::Builder::default();
-        let mut table = Vec::with_capacity(flakes.clusters());
-        for k in 0..flakes.slices() {
-            builder.build(flakes.slice_at(k).probability, &mut table);
-        }
-        let texels = table.len().div_ceil(width) * width;
-        #[allow(clippy::cast_possible_truncation)] // texel precision
-        let mut threshold: Vec<f32> = table.iter().map(|entry| entry.threshold as f32).collect();
-        #[allow(clippy::cast_precision_loss)] // below 2^24, exact
-        let mut alias: Vec<f32> = table.iter().map(|entry| entry.alias as f32).collect();
-        threshold.resize(texels, 1.0);
-        alias.resize(texels, 0.0);
-        let about = "alias table of every slice: threshold (R, 0 to 1) and alias (G, cluster within the slice)";
-        self.floats("alias", width, &[("R", &threshold), ("G", &alias)], about)
-    }
-
-    fn inverse_cdf(&mut self, flakes: &Flakes, luminances: &[f64]) -> Result<(), ExportError> {
-        let (slices, steps) = (flakes.slices(), inverse_cdf::STEPS);
-        let blocks = slices.div_ceil(MAX_ROWS);
-        let (width, height) = (steps * blocks, slices.div_ceil(blocks));
-        let mut index = vec![0_u16; width * height];
-        if flakes.widest_slice() > usize::from(u16::MAX) {
-            let accepted = usize::from(u16::MAX);
-            return Err(ExportError::TooMany {
-                what: "clusters in a slice",
-                count: flakes.widest_slice(),
-                accepted,
-            });
-        }
-        self.inverse_cdf_blocks = blocks;
-        self.slice_losses.reserve(slices);
-        for k in 0..slices {
-            let range = flakes.offsets[k] as usize..flakes.offsets[k + 1] as usize;
-            let first = k / blocks * width + k % blocks * steps;
-            let loss = inverse_cdf::write(
-                &flakes.probability[range.clone()],
-                &luminances[range],
-                &mut index[first..first + steps],
-            );
-            #[allow(clippy::cast_possible_truncation)] // stated to seven digits
-            self.slice_losses.push(loss.map(|v| v as f32));
-        }
-        let narrow = flakes.widest_slice() <= 256;
-        let about = "cluster within the slice at cumulative probability (s + 1/2)/500: slice k holds columns \
-                     500 (k mod blocks) + s of row k div blocks";
-        let (bytes, kind) = if narrow {
-            #[allow(clippy::cast_possible_truncation)] // at most 255
-            let pixels: Vec<u8> = index.iter().map(|&cluster| cluster as u8).collect();
-            (png(width, height, &pixels, ExtendedColorType::L8)?, "uint8")
-        } else {
-            // PNG's samples are big-endian, the encoder takes the machine's order.
-            (
-                png(
-                    width,
-                    height,
-                    bytemuck::cast_slice(&index),
-                    ExtendedColorType::L16,
-                )?,
-                "uint16",
-            )
-        };
-        let entry = Entry {
-            width,
-            height,
-            channels: "R",
-            kind,
-            scale: None,
-            offset: None,
-            about,
-        };
-        self.push("inverse_cdf", "png", bytes, entry);
-        Ok(())
-    }
-
     pub(super) fn random(&mut self, flakes: &Flakes) -> Result<(), ExportError> {
         static KNOWN: [OnceLock<Vec<u8>>; RandomTexture::KINDS] =
             [const { OnceLock::new() }; RandomTexture::KINDS];
@@ -454,15 +300,7 @@ impl Textures {
         };
         let about = "32-bit number of every texel's cell, lowest byte in R, highest in A (read it without \
                      premultiplication or color management); the tile repeats, see carpaint_cell in the shader";
-        let entry = Entry {
-            width,
-            height,
-            channels: "RGBA",
-            kind: "uint8",
-            scale: None,
-            offset: None,
-            about,
-        };
+        let entry = Entry::plain([width, height], "RGBA", "uint8", about);
         self.push("random", "png", bytes, entry);
         Ok(())
     }
@@ -475,79 +313,4 @@ fn cluster_width(clusters: usize) -> usize {
         width *= 2;
     }
     width
-}
-
-/// Mean color of every slice in 1/sr, and mean luminance of every cluster (of π f).
-pub(super) fn means(flakes: &Flakes) -> (Vec<LinearRgb>, Vec<f64>) {
-    let mut luminances = Vec::with_capacity(flakes.clusters());
-    let means = (0..flakes.slices())
-        .map(|k| {
-            let slice = flakes.slice_at(k);
-            let mut sum = [0.0; 3];
-            for ((p, &lower), &upper) in slice.probability.iter().zip(slice.lower).zip(slice.upper)
-            {
-                let color = mean_color(lower, upper);
-                luminances.push(luminance(color));
-                for c in 0..3 {
-                    sum[c] += p * color[c];
-                }
-            }
-            sum.map(|s| s / std::f64::consts::PI)
-        })
-        .collect();
-    (means, luminances)
-}
-
-/// Largest difference between halves and what they stand for.
-fn rounding(half: &[f16], exact: &[f32]) -> f32 {
-    let mut back = vec![0.0_f32; half.len()];
-    half.convert_to_f32_slice(&mut back);
-    back.iter()
-        .zip(exact)
-        .fold(0.0, |worst, (x, y)| f32::max(worst, (x - y).abs()))
-}
-
-/// The range of all corners, in 255 steps an axis.
-pub(super) struct Range8 {
-    pub(super) scale: [f32; 3],
-    pub(super) offset: [f32; 3],
-}
-
-impl Range8 {
-    pub(super) fn of(lower: &[[f32; 3]], upper: &[[f32; 3]]) -> Self {
-        let mut low = [f32::INFINITY; 3];
-        let mut high = [f32::NEG_INFINITY; 3];
-        for corner in lower.iter().chain(upper) {
-            for k in 0..3 {
-                low[k] = low[k].min(corner[k]);
-                high[k] = high[k].max(corner[k]);
-            }
-        }
-        Self {
-            scale: std::array::from_fn(|k| high[k] - low[k]),
-            offset: low,
-        }
-    }
-
-    fn quantise(&self, corners: &[[f32; 3]], texels: usize) -> (Vec<u8>, f32) {
-        let mut worst = 0.0_f32;
-        let mut pixels = Vec::with_capacity(texels * 3);
-        for corner in corners {
-            for k in 0..3 {
-                let share = if self.scale[k] > 0.0 {
-                    (corner[k] - self.offset[k]) / self.scale[k]
-                } else {
-                    0.0
-                };
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within 0..=255
-                let byte = (share * 255.0).round().clamp(0.0, 255.0) as u8;
-                worst = worst.max(
-                    (self.offset[k] + self.scale[k] * f32::from(byte) / 255.0 - corner[k]).abs(),
-                );
-                pixels.push(byte);
-            }
-        }
-        pixels.resize(texels * 3, 0);
-        (pixels, worst)
-    }
 }

@@ -31,36 +31,75 @@ impl BoxRule {
 /// Corners of smallest and of largest L, a, b.
 pub(super) type Corners = ([f32; 3], [f32; 3]);
 
-/// The bounding box of the members.
-pub(super) fn tight(members: &[Texel]) -> Corners {
-    let (mut lower, mut upper) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    for texel in members {
-        for k in 0..3 {
-            (lower[k], upper[k]) = (lower[k].min(texel[k]), upper[k].max(texel[k]));
-        }
-    }
-    (lower, upper)
+/// What a box needs to know of a cluster's members.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Members {
+    pub count: f64,
+    /// Mean in Lab.
+    pub mean: [f64; 3],
+    /// Variance in Lab, per axis.
+    pub variance: [f64; 3],
+    /// Mean in linear light, of π f.
+    pub light: LinearRgb,
+    /// The bounding box in Lab.
+    pub hull: Corners,
 }
 
-/// The box of the members' mean and variance, and of their mean in linear light plus `more`.
-pub(super) fn moments(members: &[Texel], light: &[[f32; 4]], more: LinearRgb) -> Corners {
-    let origin = members[0].map(f64::from);
-    let (mut first, mut second, mut sum) = ([0.0_f64; 3], [0.0_f64; 3], [0.0_f64; 3]);
-    for texel in members {
-        let rgb = linear(texel, light);
-        for k in 0..3 {
-            let d = f64::from(texel[k]) - origin[k];
-            first[k] += d;
-            second[k] += d * d;
-            sum[k] += rgb[k];
+impl Members {
+    /// Of these texels, at least one.
+    pub(super) fn of(texels: &[Texel], light: &[[f32; 4]]) -> Self {
+        let origin = texels[0].map(f64::from);
+        let (mut first, mut second, mut sum) = ([0.0_f64; 3], [0.0_f64; 3], [0.0_f64; 3]);
+        let (mut lower, mut upper) = (texels[0], texels[0]);
+        for texel in texels {
+            let rgb = linear(texel, light);
+            for k in 0..3 {
+                let d = f64::from(texel[k]) - origin[k];
+                first[k] += d;
+                second[k] += d * d;
+                sum[k] += rgb[k];
+            }
+            for k in 0..4 {
+                lower[k] = if texel[k] < lower[k] {
+                    texel[k]
+                } else {
+                    lower[k]
+                };
+                upper[k] = if texel[k] > upper[k] {
+                    texel[k]
+                } else {
+                    upper[k]
+                };
+            }
+        }
+        let count = texels.len() as f64;
+        let corner = |corner: Texel| [corner[0], corner[1], corner[2]];
+        Self {
+            count,
+            mean: std::array::from_fn(|k| origin[k] + first[k] / count),
+            variance: std::array::from_fn(|k| {
+                (second[k] / count - (first[k] / count).powi(2)).max(0.0)
+            }),
+            light: sum.map(|s| s / count),
+            hull: (corner(lower), corner(upper)),
         }
     }
-    let count = members.len() as f64;
-    let mean: [f64; 3] = std::array::from_fn(|k| origin[k] + first[k] / count);
-    let variance =
-        std::array::from_fn(|k| (second[k] / count - (first[k] / count).powi(2)).max(0.0));
-    let light = std::array::from_fn(|k| sum[k] / count + more[k]);
-    of_moments(mean, variance, light)
+
+    /// The box of the members' mean and variance, and of their mean in linear light plus `more`.
+    pub(super) fn moments(&self, more: LinearRgb) -> Corners {
+        let light = std::array::from_fn(|k| self.light[k] + more[k]);
+        of_moments(self.mean, self.variance, light)
+    }
+
+    /// Root of the mean squared distance between members and independent colors of a box, Lab units.
+    pub(super) fn reach(&self, (lower, upper): Corners) -> f64 {
+        let axis = |k: usize| {
+            let (low, high) = (f64::from(lower[k]), f64::from(upper[k]));
+            let off = self.mean[k] - f64::midpoint(low, high);
+            self.variance[k] + off * off + (high - low) * (high - low) / 12.0
+        };
+        (0..3).map(axis).sum::<f64>().sqrt()
+    }
 }
 
 /// The box of this mean and variance in Lab whose middle is moved until its mean in linear light is `light`.
@@ -77,21 +116,4 @@ pub(super) fn of_moments(mean: [f64; 3], variance: [f64; 3], light: LinearRgb) -
         std::array::from_fn(|k| ((center[k] + sign * half[k]) as f32).clamp(-bound, bound))
     };
     (corner(-1.0), corner(1.0))
-}
-
-/// Root of the mean squared distance between members and independent colors of their box, Lab units.
-pub(super) fn reach(members: &[Texel], lower: [f32; 3], upper: [f32; 3]) -> f64 {
-    let mut squared = 0.0_f64;
-    for k in 0..3 {
-        let (center, half) = (
-            f32::midpoint(lower[k], upper[k]),
-            f64::from(upper[k] - lower[k]) / 2.0,
-        );
-        let sum: f32 = members
-            .iter()
-            .map(|texel| (texel[k] - center) * (texel[k] - center))
-            .sum();
-        squared += f64::from(sum) / members.len() as f64 + half * half / 3.0;
-    }
-    squared.sqrt()
 }

@@ -18,11 +18,18 @@
 //! Clusters ascend in the lightness of their centers. Equal boxes are one cluster.
 
 use std::cmp::Ordering;
+use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::boxes::{BoxRule, moments, reach, tight};
+use super::boxes::{BoxRule, Corners, Members};
 use super::texels::{Texel, linear, take_in};
+use brightest::{SPARKLE, bright_groups, brightest_last};
+use crowd::Crowd;
+
+mod brightest;
+mod crowd;
+mod sampled;
 
 /// How a slice is clustered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -72,18 +79,10 @@ pub struct NoTexel {
     pub pixels: usize,
 }
 
-/// Share of the brightest texels at which sparkle is judged: the 99.9th percentile.
-const SPARKLE: f64 = 1e-3;
 /// Share of the clusters that the brightest texels get.
 const BRIGHT_SHARE: usize = 5;
-/// Sizes of the clusters below the sparkle's, of 4096 texels.
-const BELOW_SPARKLE: [usize; 4] = [2, 2, 4, 8];
 /// Largest cluster that the sparkle is a single color in.
 const FLAT: usize = 8;
-/// Brightest texels up to which a list of them beats partial sorting.
-const LISTED: usize = 64;
-/// Buckets of lightness that the crowd is sorted into.
-const BUCKETS: usize = 256;
 
 /// Room for clustering, kept from slice to slice.
 #[derive(Debug, Default)]
@@ -91,95 +90,8 @@ pub struct Clusterer {
     texels: Vec<Texel>,
     /// The picture's numbers, pixel by pixel.
     light: Vec<[f32; 4]>,
-    sorted: Vec<Texel>,
-    bucket: Vec<u8>,
-    leaves: Vec<Node>,
-    /// Texels that are not among the brightest.
-    crowd: usize,
-}
-
-/// Sums over texels, around [`Clusterer`]'s origin.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    count: f32,
-    first: [f32; 4],
-    second: [f32; 4],
-}
-
-impl Sums {
-    fn of(texels: &[Texel], origin: &Texel) -> Self {
-        let mut sums = Self {
-            count: texels.len() as f32,
-            ..Self::default()
-        };
-        for texel in texels {
-            for k in 0..4 {
-                let d = texel[k] - origin[k];
-                sums.first[k] += d;
-                sums.second[k] += d * d;
-            }
-        }
-        sums
-    }
-
-    fn add(&mut self, other: &Self) {
-        self.count += other.count;
-        for k in 0..4 {
-            self.first[k] += other.first[k];
-            self.second[k] += other.second[k];
-        }
-    }
-
-    /// The sums over the texels that `part` leaves. Rounding matters little: they only choose where to split.
-    fn without(mut self, part: &Self) -> Self {
-        self.count -= part.count;
-        for k in 0..4 {
-            self.first[k] -= part.first[k];
-            self.second[k] -= part.second[k];
-        }
-        self
-    }
-
-    /// Squared distances from the mean, per axis.
-    fn spread(&self, axis: usize) -> f32 {
-        (self.second[axis] - self.first[axis] * self.first[axis] / self.count.max(1.0)).max(0.0)
-    }
-}
-
-/// A run of texels that may be split further.
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    from: usize,
-    to: usize,
-    /// Buckets of lightness, while the texels still lie in their order.
-    buckets: Option<(usize, usize)>,
-    sums: Sums,
-    /// Sum of squares that a split can lower; 0 when there is nothing to split.
-    spread: f32,
-    axis: usize,
-}
-
-impl Node {
-    fn new(from: usize, to: usize, buckets: Option<(usize, usize)>, sums: Sums) -> Self {
-        let spreads = [sums.spread(0), sums.spread(1), sums.spread(2)];
-        let axis = (0..3).fold(
-            0,
-            |best, k| if spreads[k] > spreads[best] { k } else { best },
-        );
-        let spread = if to - from > 1 {
-            spreads.iter().sum()
-        } else {
-            0.0
-        };
-        Self {
-            from,
-            to,
-            buckets,
-            sums,
-            spread,
-            axis,
-        }
-    }
+    crowd: Crowd,
+    passage: sampled::Passage,
 }
 
 impl Clusterer {
@@ -193,323 +105,120 @@ impl Clusterer {
         planes: [&[f32]; 3],
         settings: &ClusterSettings,
     ) -> Result<SliceClusters, NoTexel> {
+        if let Some(clusters) = self.cluster_by_sample(planes, settings) {
+            return Ok(clusters);
+        }
         let pixels = planes[0].len();
         let (dead, beyond) = take_in(planes, &mut self.texels, &mut self.light);
         if self.texels.is_empty() {
             return Err(NoTexel { pixels });
         }
         let most = settings.clusters.max(1);
-        self.leaves.clear();
-        self.crowd = self.take_brightest(most);
-        self.split_crowd(self.crowd, most - self.leaves.len());
-        let mut clusters = self.boxes(settings.box_rule);
-        (clusters.dead, clusters.beyond) = (dead, beyond);
-        Ok(clusters)
-    }
-
-    /// Moves the brightest texels behind the others, a leaf for each group; returns how many the others are.
-    fn take_brightest(&mut self, most: usize) -> usize {
         let count = self.texels.len();
-        let ends = bright_groups(count, most / BRIGHT_SHARE);
+        let mut ends = bright_groups(count, most / BRIGHT_SHARE);
         let taken = ends.last().copied().unwrap_or(0);
-        if taken == 0 || taken >= count {
-            return count;
-        }
-        let crowd = count - taken;
-        if taken <= LISTED {
-            self.list_brightest(crowd);
+        let crowd = if taken == 0 || taken >= count {
+            ends.clear();
+            count
         } else {
-            self.texels.select_nth_unstable_by(crowd, by_lightness);
-            self.texels[crowd..].sort_unstable_by(|x, y| by_lightness(y, x));
-        }
-        let mut from = 0;
-        for to in ends {
-            self.leaves
-                .push(Node::new(crowd + from, crowd + to, None, Sums::default()));
-            from = to;
-        }
-        crowd
-    }
-
-    /// Moves all but `crowd` texels, the brightest, to the end, the brightest of them first: by a short list.
-    fn list_brightest(&mut self, crowd: usize) {
-        let taken = self.texels.len() - crowd;
-        let mut list: Vec<Texel> = Vec::with_capacity(taken + 1);
-        let mut least = f32::NEG_INFINITY;
-        for texel in &self.texels {
-            if texel[0] >= least {
-                let place = list.partition_point(|brighter| by_lightness(brighter, texel).is_gt());
-                list.insert(place, *texel);
-                list.truncate(taken);
-                if list.len() == taken {
-                    least = list[taken - 1][0];
-                }
-            }
-        }
-        let (last, mut end, mut k) = (list[taken - 1], self.texels.len(), 0);
-        while end > crowd {
-            if self.texels[k][0] >= least && by_lightness(&self.texels[k], &last).is_ge() {
-                end -= 1;
-                self.texels.swap(k, end);
-            } else {
-                k += 1;
-            }
-        }
-        self.texels[crowd..].copy_from_slice(&list);
-    }
-
-    /// Splits the first `crowd` texels into at most `most` leaves.
-    fn split_crowd(&mut self, crowd: usize, most: usize) {
-        let (origin, starts, sums) = self.sort_into_buckets(crowd);
-        let first = self.leaves.len();
-        self.leaves.push(bucketed(&starts, &sums, 0, BUCKETS));
-        // A run that lost its buckets is split by moving its texels.
-        while self.leaves.len() - first < most {
-            let widest = (first..self.leaves.len()).reduce(|best, k| {
-                if self.leaves[k].spread > self.leaves[best].spread {
-                    k
-                } else {
-                    best
-                }
-            });
-            let Some(widest) = widest.filter(|k| self.leaves[*k].spread > 0.0) else {
-                break;
-            };
-            let node = self.leaves[widest];
-            let mean = origin[node.axis] + node.sums.first[node.axis] / node.sums.count;
-            let halves = match node.buckets {
-                Some((low, high)) if node.axis == 0 => split_buckets(&starts, &sums, low, high),
-                _ => None,
-            };
-            let halves = halves.or_else(|| {
-                let middle =
-                    node.from + partition(&mut self.texels[node.from..node.to], node.axis, mean);
-                (middle > node.from && middle < node.to).then(|| {
-                    let runs = [node.from..middle, middle..node.to];
-                    let fewer = usize::from(runs[1].len() < runs[0].len());
-                    let sums = Sums::of(&self.texels[runs[fewer].clone()], &origin);
-                    let others = node.sums.without(&sums);
-                    let sums = if fewer == 0 {
-                        [sums, others]
-                    } else {
-                        [others, sums]
-                    };
-                    [0, 1].map(|k| Node::new(runs[k].start, runs[k].end, None, sums[k]))
-                })
-            });
-            match halves {
-                Some([left, right]) => {
-                    self.leaves[widest] = left;
-                    self.leaves.push(right);
-                }
-                None => self.leaves[widest].spread = 0.0,
-            }
-        }
-    }
-
-    /// Sorts the crowd by bucket of lightness; returns the origin of the sums, the buckets' starts and sums.
-    fn sort_into_buckets(&mut self, crowd: usize) -> (Texel, Vec<usize>, Vec<Sums>) {
-        let texels = &self.texels[..crowd];
-        let (mut low, mut high) = (texels[0], texels[0]);
-        for texel in texels {
-            for k in 0..4 {
-                low[k] = if texel[k] < low[k] { texel[k] } else { low[k] };
-                high[k] = if texel[k] > high[k] {
-                    texel[k]
-                } else {
-                    high[k]
-                };
-            }
-        }
-        // Sums about any point in the crowd keep their digits; a sample's mean is such a point.
-        let sample = texels.iter().step_by(16);
-        let share = 1.0 / sample.len() as f32;
-        let mut origin = [0.0; 4];
-        for texel in sample {
-            for k in 0..4 {
-                origin[k] += texel[k] * share;
-            }
-        }
-        let scale = if high[0] > low[0] {
-            BUCKETS as f32 / (high[0] - low[0])
-        } else {
-            0.0
+            brightest_last(&mut self.texels, taken);
+            count - taken
         };
-        self.bucket.clear();
-        self.bucket.extend(
-            texels
-                .iter()
-                .map(|texel| (((texel[0] - low[0]) * scale) as usize).min(BUCKETS - 1) as u8),
-        );
-        let mut starts = vec![0_usize; BUCKETS + 1];
-        for &bucket in &self.bucket {
-            starts[usize::from(bucket) + 1] += 1;
-        }
-        for k in 0..BUCKETS {
-            starts[k + 1] += starts[k];
-        }
-        let mut next = starts.clone();
-        self.sorted.clear();
-        self.sorted.resize(crowd, [0.0; 4]);
-        for (texel, &bucket) in texels.iter().zip(&self.bucket) {
-            let place = &mut next[usize::from(bucket)];
-            self.sorted[*place] = *texel;
-            *place += 1;
-        }
-        self.texels[..crowd].copy_from_slice(&self.sorted);
-        let sums = starts
-            .windows(2)
-            .map(|w| Sums::of(&self.texels[w[0]..w[1]], &origin))
-            .collect();
-        (origin, starts, sums)
+        self.crowd
+            .split(&mut self.texels[..crowd], most - ends.len());
+        let mut leaves: Vec<Range<usize>> = groups(crowd, &ends).collect();
+        leaves.extend(self.crowd.runs());
+        Ok(SliceClusters {
+            dead,
+            beyond,
+            ..gathered(self.boxes(crowd, &leaves, settings.box_rule))
+        })
     }
 
-    /// The leaf around the 99.9th percentile, where it is small.
-    fn flat_leaf(&self) -> Option<usize> {
-        let sparkle = self.crowd + (SPARKLE * self.texels.len() as f64) as usize;
-        let small =
-            |leaf: &Node| leaf.from <= sparkle && sparkle < leaf.to && leaf.to - leaf.from <= FLAT;
-        self.leaves.iter().position(small)
-    }
-
-    /// The boxes of all leaves, lightest last.
-    fn boxes(&self, rule: BoxRule) -> SliceClusters {
-        let mut boxes: Vec<(usize, [f32; 3], [f32; 3])> = Vec::with_capacity(self.leaves.len());
-        let (flat, light) = (self.flat_leaf(), self.light.as_slice());
+    /// The leaves with their boxes.
+    fn boxes(
+        &self,
+        crowd: usize,
+        leaves: &[Range<usize>],
+        rule: BoxRule,
+    ) -> Vec<(Members, Corners)> {
+        let light = self.light.as_slice();
+        // The leaf around the 99.9th percentile, where it is small.
+        let sparkle = crowd + (SPARKLE * self.texels.len() as f64) as usize;
+        let flat = leaves
+            .iter()
+            .position(|leaf| leaf.contains(&sparkle) && leaf.len() <= FLAT);
         let (mut owed, mut brighter) = ([0.0; 3], 0);
         if let Some(flat) = flat {
-            let members = &self.texels[self.leaves[flat].from..self.leaves[flat].to];
+            let members = &self.texels[leaves[flat].clone()];
             let middle = linear(&members[members.len() / 2], light);
             for texel in members {
                 let own = linear(texel, light);
                 (0..3).for_each(|k| owed[k] += own[k] - middle[k]);
             }
-            brighter = self.leaves[flat].from - self.crowd;
+            brighter = leaves[flat].start - crowd;
         }
-        let mut moved = 0.0;
-        for (number, leaf) in self.leaves.iter().enumerate() {
-            let members = &self.texels[leaf.from..leaf.to];
-            let (lower, upper) = match rule {
-                BoxRule::Tight => tight(members),
+        let leaves = leaves.iter().enumerate().map(|(number, leaf)| {
+            let texels = &self.texels[leaf.clone()];
+            let members = Members::of(texels, light);
+            let corners = match rule {
+                BoxRule::Tight => members.hull,
                 BoxRule::Moments if Some(number) == flat && brighter > 0 => {
-                    moments(&members[members.len() / 2..][..1], light, [0.0; 3])
+                    Members::of(&texels[texels.len() / 2..][..1], light).moments([0.0; 3])
                 }
                 BoxRule::Moments if flat.is_some_and(|flat| number < flat) => {
-                    moments(members, light, owed.map(|o| o / brighter as f64))
+                    members.moments(owed.map(|o| o / brighter as f64))
                 }
-                BoxRule::Moments => moments(members, light, [0.0; 3]),
+                BoxRule::Moments => members.moments([0.0; 3]),
             };
-            moved += members.len() as f64 * reach(members, lower, upper);
-            boxes.push((members.len(), lower, upper));
-        }
-        let center = |(_, l, u): &(usize, [f32; 3], [f32; 3])| [0, 1, 2].map(|k| l[k] + u[k]);
-        boxes.sort_by(|x, y| {
-            let (cx, cy) = (center(x), center(y));
-            let order = |a: &[f32; 3], b: &[f32; 3]| {
-                (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne())
-            };
-            let order = order(&cx, &cy)
-                .or_else(|| order(&x.1, &y.1))
-                .or_else(|| order(&x.2, &y.2));
-            order.unwrap_or(Ordering::Equal)
+            (members, corners)
         });
-        boxes.dedup_by(|next, kept| {
-            let same = (next.1, next.2) == (kept.1, kept.2);
-            kept.0 += if same { next.0 } else { 0 };
-            same
-        });
-        let whole = self.texels.len() as f64;
-        SliceClusters {
-            probability: boxes.iter().map(|b| b.0 as f64 / whole).collect(),
-            lower: boxes.iter().map(|b| b.1).collect(),
-            upper: boxes.iter().map(|b| b.2).collect(),
-            dead: 0,
-            beyond: 0,
-            w1_bound: moved / whole,
-        }
+        leaves.collect()
     }
 }
 
-/// Order of lightness, of the place in the picture among equals.
-fn by_lightness(x: &Texel, y: &Texel) -> Ordering {
-    x[0].total_cmp(&y[0]).then(x[3].total_cmp(&y[3]))
+/// Where the groups of the brightest texels are that begin at `crowd`.
+fn groups(crowd: usize, ends: &[usize]) -> impl Iterator<Item = Range<usize>> {
+    let starts = std::iter::once(0).chain(ends.iter().copied());
+    starts
+        .zip(ends)
+        .map(move |(from, to)| crowd + from..crowd + to)
 }
 
-/// Ends of the groups of the brightest of `count` texels, brightest first, in at most `groups` groups.
-fn bright_groups(count: usize, groups: usize) -> Vec<usize> {
-    let rank = SPARKLE * (count as f64 - 1.0);
-    let (middle, reach) = (rank.round() as usize, (0.3 * rank).round() as usize);
-    let (from, to) = (middle - reach, middle + reach + 1);
-    let mut ends = match groups {
-        0..3 => Vec::new(),
-        3..6 => vec![from, to],
-        _ => vec![from / 3, from * 2 / 3, from, to],
-    };
-    for size in BELOW_SPARKLE
+/// Leaves and their boxes as clusters, lightest last.
+fn gathered(leaves: Vec<(Members, Corners)>) -> SliceClusters {
+    let (mut moved, mut whole) = (0.0, 0.0);
+    for (members, corners) in &leaves {
+        moved += members.count * members.reach(*corners);
+        whole += members.count;
+    }
+    let mut boxes: Vec<(f64, [f32; 3], [f32; 3])> = leaves
         .into_iter()
-        .take(groups.saturating_sub(ends.len()))
-    {
-        if let Some(end) = ends.last().copied() {
-            ends.push(end + (count * size + 2048) / 4096);
-        }
+        .map(|(members, (lower, upper))| (members.count, lower, upper))
+        .collect();
+    let center = |(_, l, u): &(f64, [f32; 3], [f32; 3])| [0, 1, 2].map(|k| l[k] + u[k]);
+    boxes.sort_by(|x, y| {
+        let (cx, cy) = (center(x), center(y));
+        let order =
+            |a: &[f32; 3], b: &[f32; 3]| (0..3).map(|k| a[k].total_cmp(&b[k])).find(|o| o.is_ne());
+        let order = order(&cx, &cy)
+            .or_else(|| order(&x.1, &y.1))
+            .or_else(|| order(&x.2, &y.2));
+        order.unwrap_or(Ordering::Equal)
+    });
+    boxes.dedup_by(|next, kept| {
+        let same = (next.1, next.2) == (kept.1, kept.2);
+        kept.0 += if same { next.0 } else { 0.0 };
+        same
+    });
+    SliceClusters {
+        probability: boxes.iter().map(|b| b.0 / whole).collect(),
+        lower: boxes.iter().map(|b| b.1).collect(),
+        upper: boxes.iter().map(|b| b.2).collect(),
+        dead: 0,
+        beyond: 0,
+        w1_bound: moved / whole,
     }
-    ends.retain(|end| *end > 0);
-    ends.dedup();
-    ends
-}
-
-/// The node of a run of buckets.
-fn bucketed(starts: &[usize], sums: &[Sums], low: usize, high: usize) -> Node {
-    let mut sum = Sums::default();
-    for bucket in &sums[low..high] {
-        sum.add(bucket);
-    }
-    Node::new(starts[low], starts[high], Some((low, high)), sum)
-}
-
-/// Splits a run of buckets where the sum of squares of lightness falls most.
-fn split_buckets(starts: &[usize], sums: &[Sums], low: usize, high: usize) -> Option<[Node; 2]> {
-    let (mut count, mut light) = (0.0_f32, 0.0_f32);
-    for bucket in &sums[low..high] {
-        count += bucket.count;
-        light += bucket.first[0];
-    }
-    let (mut left, mut left_light, mut best) = (0.0_f32, 0.0_f32, (0.0_f32, None));
-    for k in low..high - 1 {
-        left += sums[k].count;
-        left_light += sums[k].first[0];
-        if left == 0.0 || sums[k].count == 0.0 || left == count {
-            continue;
-        }
-        let right_light = light - left_light;
-        let between = left_light / left - right_light / (count - left);
-        let gain = left * (count - left) * between * between;
-        if gain > best.0 {
-            best = (gain, Some(k + 1));
-        }
-    }
-    best.1.map(|k| {
-        [
-            bucketed(starts, sums, low, k),
-            bucketed(starts, sums, k, high),
-        ]
-    })
-}
-
-/// Moves the texels below `pivot` on an axis to the front; returns how many they are.
-///
-/// Without a branch to guess, and with the comparison before the exchange: through memory it would wait for the stores.
-#[allow(clippy::manual_swap)]
-fn partition(texels: &mut [Texel], axis: usize, pivot: f32) -> usize {
-    let mut below = 0;
-    for k in 0..texels.len() {
-        let goes = usize::from(texels[k][axis] < pivot);
-        let texel = texels[k];
-        texels[k] = texels[below];
-        texels[below] = texel;
-        below += goes;
-    }
-    below
 }
 
 #[cfg(test)]

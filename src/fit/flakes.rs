@@ -15,7 +15,7 @@ use super::lifetime::{Lifetime, comonotone, correlation, lifetime};
 use super::thinned::Thinned;
 use crate::color::luminance;
 use crate::measurement::{FlakePictures, PackageError, SliceRoom};
-use crate::paint::{Clustering, FlakeTexture, Flakes, Percentiles};
+use crate::paint::{Clustering, FlakeTexture, Flakes, Percentiles, SharedList};
 
 /// Most texels of a slice that grain and lifetime look at: whole rows from the top.
 const PROBED_TEXELS: usize = 1 << 18;
@@ -176,8 +176,8 @@ fn gather(pictures: &dyn FlakePictures, fitted: &[FittedSlice], texture: FlakeTe
     let mut flakes = Flakes {
         theta_h: pictures.theta_h().clone(),
         theta_d: pictures.theta_d().clone(),
-        offsets: vec![0],
-        probability: Vec::new(),
+        offsets: vec![0].into(),
+        probability: SharedList::default(),
         lower: Vec::new(),
         upper: Vec::new(),
         texture,

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::boxes::of_moments;
 use crate::color::LinearRgb;
-use crate::paint::{Flakes, Slice, mean_color};
+use crate::paint::{Flakes, SharedList, Slice, mean_color};
 
 /// Probability and corners of a finished cluster.
 type Boxed = (f64, [f32; 3], [f32; 3]);
@@ -34,8 +34,8 @@ pub fn reduce_clusters(flakes: &Flakes, most: usize) -> Flakes {
     let mut reduced = Flakes {
         theta_h: flakes.theta_h.clone(),
         theta_d: flakes.theta_d.clone(),
-        offsets: vec![0],
-        probability: Vec::new(),
+        offsets: vec![0].into(),
+        probability: SharedList::default(),
         lower: Vec::new(),
         upper: Vec::new(),
         texture: flakes.texture,
@@ -169,8 +169,8 @@ mod tests {
         Flakes {
             theta_h: AngleGrid::single(),
             theta_d: AngleGrid::single(),
-            offsets: vec![0, count],
-            probability: vec![1.0 / f64::from(count); count as usize],
+            offsets: vec![0, count].into(),
+            probability: vec![1.0 / f64::from(count); count as usize].into(),
             upper: lower.iter().map(|l| l.map(|v| v + 3.0)).collect(),
             lower,
             texture: FlakeTexture {

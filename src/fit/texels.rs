@@ -18,31 +18,117 @@ fn number(texel: &Texel) -> usize {
 }
 
 /// Texels that are converted at once.
-const LANES: usize = 64;
+pub(super) const LANES: usize = 64;
 
-/// Lab of π f for up to 64 texels, in `f32`; whether all of them are finite and within the bounds.
-///
-/// Good to 2e-6 of f, a hundredth of what the half floats of a slice resolve. For the assignment of texels to
-/// clusters; [`Lab::from_rgb`] is the exact one.
-fn lab_of(rgb: [&[f32]; 3], out: &mut [[f32; LANES]; 3]) -> bool {
-    const M: [[f32; 3]; 3] = pi_xyz_over_white();
-    let bound = MAX_LAB as f32;
-    let n = rgb[0].len().min(LANES);
-    let (r, g, b) = (&rgb[0][..n], &rgb[1][..n], &rgb[2][..n]);
-    let [light, green_red, yellow_blue] = out;
-    let mut outside = 0_u32;
-    for k in 0..n {
-        let f = M.map(|m| compress(m[0] * r[k] + m[1] * g[k] + m[2] * b[k]));
-        let lab = [
-            116.0 * f[1] - 16.0,
-            500.0 * (f[0] - f[1]),
-            200.0 * (f[1] - f[2]),
-        ];
-        let inside = (lab[0].abs() <= bound) & (lab[1].abs() <= bound) & (lab[2].abs() <= bound);
-        outside |= u32::from(!inside);
-        (light[k], green_red[k], yellow_blue[k]) = (lab[0], lab[1], lab[2]);
+/// Up to 64 texels of a picture: what it says of them, in 1/sr, and their Lab.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lot {
+    pub rgb: [[f32; LANES]; 3],
+    pub lab: [[f32; LANES]; 3],
+    /// How many they are.
+    pub count: usize,
+    /// Those with a finite color, a bit for each.
+    pub live: u64,
+    /// How many were held at the bounds.
+    pub beyond: usize,
+}
+
+impl Lot {
+    /// A lot to take texels into.
+    pub(super) const EMPTY: Self = Self {
+        rgb: [[0.0; LANES]; 3],
+        lab: [[0.0; LANES]; 3],
+        count: 0,
+        live: 0,
+        beyond: 0,
+    };
+
+    /// Takes the first 64 of these texels at most.
+    #[inline(always)]
+    pub(super) fn take(&mut self, planes: [&[f32]; 3]) {
+        self.count = planes[0].len().min(LANES);
+        for (own, plane) in self.rgb.iter_mut().zip(planes) {
+            own[..self.count].copy_from_slice(&plane[..self.count]);
+        }
+        self.live = u64::MAX >> (LANES - self.count);
+        self.beyond = 0;
+        if !self.convert() {
+            self.hold_to_bounds();
+        }
     }
-    outside == 0
+
+    /// Lab of π f in `f32`; whether all of them are finite and within the bounds.
+    ///
+    /// Good to 2e-6 of f, a hundredth of what the half floats of a slice resolve. For the assignment of texels to
+    /// clusters; [`Lab::from_rgb`] is the exact one.
+    #[inline(always)]
+    fn convert(&mut self) -> bool {
+        const M: [[f32; 3]; 3] = pi_xyz_over_white();
+        let bound = MAX_LAB as f32;
+        // Written out, and each in turn: as a map over the rows it was not inlined, and the loop not vectorised.
+        let ([r, g, b], [light, green_red, yellow_blue]) = (&self.rgb, &mut self.lab);
+        let mut outside = 0_u32;
+        // All lanes, whatever a shorter lot leaves in the last of them: its bounds then only cost a second look.
+        for k in 0..LANES {
+            let f = [
+                compress(M[0][0] * r[k] + M[0][1] * g[k] + M[0][2] * b[k]),
+                compress(M[1][0] * r[k] + M[1][1] * g[k] + M[1][2] * b[k]),
+                compress(M[2][0] * r[k] + M[2][1] * g[k] + M[2][2] * b[k]),
+            ];
+            let lab = [
+                116.0 * f[1] - 16.0,
+                500.0 * (f[0] - f[1]),
+                200.0 * (f[1] - f[2]),
+            ];
+            let inside =
+                (lab[0].abs() <= bound) & (lab[1].abs() <= bound) & (lab[2].abs() <= bound);
+            outside |= u32::from(!inside);
+            (light[k], green_red[k], yellow_blue[k]) = (lab[0], lab[1], lab[2]);
+        }
+        outside == 0
+    }
+
+    /// Marks what is not finite as dead and moves what lies beyond the bounds to them.
+    #[cold]
+    fn hold_to_bounds(&mut self) {
+        let bound = MAX_LAB as f32;
+        for k in 0..self.count {
+            if !self.rgb.iter().all(|plane| plane[k].is_finite()) {
+                self.live &= !(1 << k);
+                continue;
+            }
+            let lab = self.lab.map(|axis| axis[k]);
+            // A finite color whose own arithmetic overflowed is as light as can be.
+            let overflown = [bound, 0.0, 0.0];
+            let held = [0, 1, 2].map(|axis| {
+                if lab[axis].is_nan() {
+                    overflown[axis]
+                } else {
+                    lab[axis].clamp(-bound, bound)
+                }
+            });
+            if held != lab {
+                self.beyond += 1;
+                let rgb = Lab::from(held.map(f64::from)).to_rgb();
+                for c in 0..3 {
+                    self.lab[c][k] = held[c];
+                    self.rgb[c][k] = (rgb[c] / std::f64::consts::PI) as f32;
+                }
+            }
+        }
+    }
+
+    /// Whether a texel's color is finite.
+    #[inline(always)]
+    pub(super) const fn lives(&self, k: usize) -> bool {
+        self.live >> k & 1 == 1
+    }
+}
+
+/// A picture's pixels in lots.
+pub(super) fn lots<'a>(planes: [&'a [f32]; 3]) -> impl Iterator<Item = [&'a [f32]; 3]> {
+    let [red, green, blue] = planes.map(|plane| plane.chunks(LANES));
+    red.zip(green).zip(blue).map(|((r, g), b)| [r, g, b])
 }
 
 /// The matrix from linear sRGB in 1/sr to XYZ of π f over white.
@@ -93,63 +179,55 @@ pub(super) fn take_in(
     texels: &mut Vec<Texel>,
     light: &mut Vec<[f32; 4]>,
 ) -> (usize, usize) {
-    let [red, green, blue] = planes;
     texels.clear();
-    texels.reserve(red.len());
+    texels.reserve(planes[0].len());
     light.clear();
-    light.reserve(red.len());
-    let mut lab = [[0.0_f32; LANES]; 3];
-    let mut within = true;
-    let mut first = 0_u32;
-    for ((r, g), b) in red
-        .chunks(LANES)
-        .zip(green.chunks(LANES))
-        .zip(blue.chunks(LANES))
-    {
-        within &= lab_of([r, g, b], &mut lab);
-        let [l, green_red, yellow_blue] = &lab;
-        let colors = l.iter().zip(green_red).zip(yellow_blue).take(r.len());
-        texels.extend(
-            (first..)
-                .zip(colors)
-                .map(|(number, ((l, a), b))| [*l, *a, *b, disguised(number)]),
-        );
-        light.extend(r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b, 0.0]));
-        first += LANES as u32;
+    light.reserve(planes[0].len());
+    let (mut lot, mut beyond) = (Lot::EMPTY, 0);
+    for planes in lots(planes) {
+        lot.take(planes);
+        beyond += lot.beyond;
+        push(&lot, texels, light);
     }
-    if within {
-        return (0, 0);
+    (planes[0].len() - texels.len(), beyond)
+}
+
+/// Adds the finite texels of a lot, and what the picture says of all.
+#[inline(always)]
+pub(super) fn push(lot: &Lot, texels: &mut Vec<Texel>, light: &mut Vec<[f32; 4]>) {
+    let first = light.len() as u32;
+    let ([l, a, b], all) = (&lot.lab, 0..lot.count);
+    if lot.live == u64::MAX >> (LANES - lot.count) {
+        let texel = |k: usize| [l[k], a[k], b[k], disguised(first + k as u32)];
+        texels.extend(all.clone().map(texel));
+    } else {
+        let live = all.clone().filter(|k| lot.lives(*k));
+        texels.extend(live.map(|k| [l[k], a[k], b[k], disguised(first + k as u32)]));
     }
-    let bound = MAX_LAB as f32;
-    texels.retain(|texel| light[number(texel)].iter().all(|v| v.is_finite()));
-    let mut beyond = 0;
-    for texel in texels.iter_mut() {
-        // A finite color whose own arithmetic overflowed is as light as can be.
-        let overflown = [bound, 0.0, 0.0];
-        let held = [0, 1, 2].map(|k| {
-            if texel[k].is_nan() {
-                overflown[k]
-            } else {
-                texel[k].clamp(-bound, bound)
-            }
-        });
-        if held != texel[..3] {
-            beyond += 1;
-            texel[..3].copy_from_slice(&held);
-            let rgb = Lab::from(held.map(f64::from))
-                .to_rgb()
-                .map(|v| (v / std::f64::consts::PI) as f32);
-            light[number(texel)][..3].copy_from_slice(&rgb);
-        }
-    }
-    (red.len() - texels.len(), beyond)
+    let [red, green, blue] = &lot.rgb;
+    light.extend(all.map(|k| [red[k], green[k], blue[k], 0.0]));
+}
+
+/// Adds one texel of a lot; it is finite.
+#[inline(always)]
+pub(super) fn push_one(lot: &Lot, k: usize, texels: &mut Vec<Texel>, light: &mut Vec<[f32; 4]>) {
+    let [l, a, b] = &lot.lab;
+    texels.push([l[k], a[k], b[k], disguised(light.len() as u32)]);
+    let [red, green, blue] = &lot.rgb;
+    light.push([red[k], green[k], blue[k], 0.0]);
+}
+
+/// What the picture says of a texel, 1/sr.
+#[inline]
+pub(super) fn light_of(texel: &Texel, light: &[[f32; 4]]) -> [f32; 3] {
+    let [r, g, b, _] = light[number(texel)];
+    [r, g, b]
 }
 
 /// Linear reflectance factor of a texel.
 #[inline]
 pub(super) fn linear(texel: &Texel, light: &[[f32; 4]]) -> LinearRgb {
-    let [r, g, b, _] = light[number(texel)];
-    [r, g, b].map(|v| f64::from(v) * std::f64::consts::PI)
+    light_of(texel, light).map(|v| f64::from(v) * std::f64::consts::PI)
 }
 
 #[cfg(test)]

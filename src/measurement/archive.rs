@@ -34,6 +34,21 @@ pub(super) enum Archive {
     Folder(PathBuf),
 }
 
+/// Room to unpack files in, kept from one to the next.
+pub(super) struct Unpacking {
+    inflater: libdeflater::Decompressor,
+    packed: Vec<u8>,
+}
+
+impl Default for Unpacking {
+    fn default() -> Self {
+        Self {
+            inflater: libdeflater::Decompressor::new(),
+            packed: Vec::new(),
+        }
+    }
+}
+
 /// A reading position of its own in a shared source.
 struct Cursor {
     source: Source,
@@ -52,6 +67,19 @@ impl Cursor {
             position: 0,
             length,
         })
+    }
+}
+
+impl Source {
+    /// Replaces `into` by so many bytes from here on; they are there.
+    fn copy(&self, start: u64, count: usize, into: &mut Vec<u8>) -> io::Result<()> {
+        into.resize(count, 0);
+        let mut cursor = Cursor {
+            source: self.clone(),
+            position: start,
+            length: start + count as u64,
+        };
+        cursor.read_exact(into)
     }
 }
 
@@ -164,6 +192,7 @@ impl Archive {
         name: &str,
         most: u64,
         into: &mut Vec<u8>,
+        room: &mut Unpacking,
     ) -> Result<(), PackageError> {
         into.clear();
         let damaged = |reason: String| PackageError::Damaged {
@@ -203,15 +232,48 @@ impl Archive {
                     )));
                 }
                 let size = usize::try_from(entry.size()).map_err(|_| too_large(entry.size()))?;
+                let (packed, checksum) = (entry.compressed_size(), entry.crc32());
                 let mut cursor = Cursor::new(source.clone()).map_err(|e| damaged(e.to_string()))?;
-                let file = entry.with_reader(&mut cursor, ZipReadOptions::new());
-                let mut file = file.map_err(|e| damaged(e.to_string()))?;
-                // The directory's size is a claim: memory grows with what really comes.
-                into.reserve(size.min(1 << 20));
-                (&mut file)
-                    .take(most + 1)
-                    .read_to_end(into)
-                    .map_err(|e| damaged(e.to_string()))?;
+                let length = cursor.length;
+                let found = entry.with_reader(&mut cursor, ZipReadOptions::new());
+                let found = found.map_err(|e| damaged(e.to_string()))?;
+                let start = found.data_start();
+                // The directory's sizes are claims: no memory for more than is there or can be packed in it.
+                let within = start.filter(|start| {
+                    start
+                        .checked_add(packed)
+                        .is_some_and(|end| end <= length && can_hold(packed, size as u64))
+                });
+                let (Some(start), Ok(packed)) = (within, usize::try_from(packed)) else {
+                    return Err(damaged("it is cut short".into()));
+                };
+                if method == CompressionMethod::Stored {
+                    if packed != size {
+                        return Err(damaged(
+                            "it is stored in another length than its own".into(),
+                        ));
+                    }
+                    source.copy(start, size, into)
+                } else {
+                    source.copy(start, packed, &mut room.packed)
+                }
+                .map_err(|e| damaged(e.to_string()))?;
+                if method == CompressionMethod::Deflated {
+                    into.resize(size, 0);
+                    let inflated = room.inflater.deflate_decompress(&room.packed, into);
+                    match inflated {
+                        Ok(length) if length == size => {}
+                        Ok(_) => {
+                            return Err(damaged(
+                                "it inflates to another length than its own".into(),
+                            ));
+                        }
+                        Err(error) => return Err(damaged(format!("it does not inflate: {error}"))),
+                    }
+                }
+                if libdeflater::crc32(into) != checksum {
+                    return Err(damaged("its checksum is wrong".into()));
+                }
             }
             Self::Folder(folder) => {
                 let path = within(folder, name).ok_or_else(missing)?;
@@ -229,6 +291,11 @@ impl Archive {
         }
         Ok(())
     }
+}
+
+/// Whether packed bytes can become so many: nothing packs denser than deflate's 1032:1.
+pub(super) const fn can_hold(packed: u64, bytes: u64) -> bool {
+    bytes / 1032 <= packed
 }
 
 /// Path of a name inside a folder; `None` for a name that would leave it.

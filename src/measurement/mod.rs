@@ -269,11 +269,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_text_file_is_refused_with_its_length_and_first_bytes() {
+    fn what_is_no_measurement_is_refused_with_its_length_and_what_it_is() {
         let error =
             BrdfMeasurement::read(b"hello, paint", &ReadOptions::default(), &Limits::default());
         let text = error.expect_err("no measurement").to_string();
-        assert!(text.contains("12 bytes") && text.contains("68"), "{text}");
+        assert!(
+            text.contains("12 bytes") && text.contains("hello, p"),
+            "{text}"
+        );
+        for (bytes, what) in [
+            (&b"\x89PNG\r\n\x1a\n"[..], "is a PNG picture"),
+            (b"", "is empty"),
+            (b"carpaint", "fitted already"),
+            (b"\x00\x01", "begins with [00, 01]"),
+        ] {
+            let error = sniff(bytes, &ReadOptions::default()).expect_err("no measurement");
+            assert!(error.to_string().contains(what), "{error}");
+        }
     }
 
     #[test]

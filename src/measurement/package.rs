@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use bytes::Bytes;
 use rayon::prelude::*;
 
-use super::archive::Archive;
+use super::archive::{Archive, Unpacking};
 use super::manifest::{BaseEntry, FlakesEntry, MANIFEST, Manifest, TableEntry};
 pub use super::manifest::{MultiAngle, TableLayout};
 use super::picture::{Picture, PictureError, PictureScratch};
@@ -92,12 +92,19 @@ pub trait FlakePictures: Sync {
 }
 
 /// Room to decode slices in, kept from one to the next.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct SliceRoom {
     /// The slice read last.
     pub picture: Picture,
     scratch: PictureScratch,
+    unpacking: Unpacking,
     bytes: Vec<u8>,
+}
+
+impl std::fmt::Debug for SliceRoom {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SliceRoom").finish_non_exhaustive()
+    }
 }
 
 /// The flake pictures of a package.
@@ -226,8 +233,9 @@ impl Package {
     }
 
     fn of(archive: Archive, limits: &Limits) -> Result<Self, PackageError> {
-        let mut bytes = Vec::new();
-        archive.read(MANIFEST, MANIFEST_BYTES.min(limits.bytes), &mut bytes)?;
+        let (mut bytes, mut unpacking) = (Vec::new(), Unpacking::default());
+        let most = MANIFEST_BYTES.min(limits.bytes);
+        archive.read(MANIFEST, most, &mut bytes, &mut unpacking)?;
         let manifest = Manifest::parse(&bytes, limits)?;
         let base = match manifest.base {
             None => None,
@@ -251,7 +259,8 @@ impl Package {
                 header_bytes,
             }) => {
                 let mut bytes = Vec::new();
-                archive.read(&file, (64 << 20) + header_bytes, &mut bytes)?;
+                let most = (64 << 20) + header_bytes;
+                archive.read(&file, most, &mut bytes, &mut unpacking)?;
                 Some(PackageBase::Table {
                     file,
                     bytes,
@@ -304,7 +313,8 @@ fn color_table_of(
     let side = |grid: &AngleGrid| u32::try_from(grid.len()).unwrap_or(u32::MAX);
     let size = [side(&theta_d), side(&theta_h)];
     let mut bytes = Vec::new();
-    archive.read(&file, picture_bytes(size), &mut bytes)?;
+    let most = picture_bytes(size);
+    archive.read(&file, most, &mut bytes, &mut Unpacking::default())?;
     let picture = Picture::read_exr(&bytes, Some(size), limits, &mut PictureScratch::default());
     let picture = picture.map_err(|source| PackageError::Picture {
         file: file.clone(),
@@ -407,18 +417,20 @@ impl FlakePictures for FlakeSlices {
 
     fn read(&self, slice: usize, room: &mut SliceRoom) -> Result<(), PackageError> {
         let file = self.name(slice);
+        let most = picture_bytes(self.entry.size);
         self.archive
-            .read(&file, picture_bytes(self.entry.size), &mut room.bytes)?;
+            .read(&file, most, &mut room.bytes, &mut room.unpacking)?;
         let decoded = room.picture.decode_exr(
             &room.bytes,
             Some(self.entry.size),
             &self.limits,
             &mut room.scratch,
         );
-        if let Err(source) = decoded {
-            return Err(PackageError::Picture { file, source });
-        }
-        let (pixels, dead) = (room.picture.pixels(), room.picture.dead());
+        let dead = match decoded {
+            Ok(dead) => dead,
+            Err(source) => return Err(PackageError::Picture { file, source }),
+        };
+        let pixels = room.picture.pixels();
         #[allow(clippy::cast_precision_loss)] // counts of pixels
         if dead as f64 > DEAD_SHARE * pixels as f64 {
             return Err(PackageError::DeadPixels { file, dead, pixels });

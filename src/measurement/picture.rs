@@ -7,6 +7,9 @@
 //!
 //! Layout: OpenEXR file layout, version 2 (openexr.com, "OpenEXR File Layout").
 
+use std::ops::Range;
+
+use super::archive::can_hold;
 use crate::paint::Limits;
 
 /// Pixels of a picture, a plane per channel, row by row.
@@ -156,11 +159,6 @@ const MOST_CHANNELS: usize = 16;
 
 /// Last of the compressions that are read: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A.
 const B44A: u8 = 7;
-
-/// Whether packed bytes can become so many: nothing packs denser than zlib's 1032:1, and no memory is for empty promises.
-const fn can_hold(packed: &[u8], bytes: usize) -> bool {
-    bytes / 1032 <= packed.len()
-}
 
 const CUT: PictureError = PictureError::Header("it is cut short");
 
@@ -320,7 +318,8 @@ impl Picture {
         Ok(picture)
     }
 
-    /// The same into a picture whose room is used again. Its contents are undefined after an error.
+    /// The same into a picture whose room is used again; returns how many pixels are dead, a channel of theirs not
+    /// finite. Its contents are undefined after an error.
     ///
     /// # Errors
     ///
@@ -331,20 +330,24 @@ impl Picture {
         wanted: Option<[u32; 2]>,
         limits: &Limits,
         scratch: &mut PictureScratch,
-    ) -> Result<(), PictureError> {
+    ) -> Result<usize, PictureError> {
         let header = Header::read(bytes, wanted, limits)?;
         (self.width, self.height) = (header.width, header.height);
         let pixels = header.width * header.height;
-        if !can_hold(bytes, header.row_bytes().saturating_mul(header.height)) {
+        if !can_hold(
+            bytes.len() as u64,
+            header.row_bytes() as u64 * header.height as u64,
+        ) {
             return Err(PictureError::Header(
                 "it promises more pixels than its bytes can hold",
             ));
         }
         let Some(rows) = header.rows_per_block() else {
-            return self.decode_general(bytes, &header);
+            self.decode_general(bytes, &header)?;
+            return Ok(self.dead(0..pixels));
         };
         for plane in &mut self.planes {
-            plane.clear();
+            // Every row is written: there are as many blocks as offsets, and no two of the same rows.
             plane.resize(pixels, 0.0);
         }
         let blocks = header.height.div_ceil(rows);
@@ -352,7 +355,7 @@ impl Picture {
             .checked_mul(8)
             .and_then(|n| bytes.get(header.end..header.end.checked_add(n)?));
         let table = table.ok_or(PictureError::Header("its offset table is cut short"))?;
-        let mut seen = vec![false; blocks];
+        let (mut seen, mut dead) = (vec![false; blocks], 0);
         for (block, offset) in table.chunks_exact(8).enumerate() {
             let damaged = |reason: &str| PictureError::Block {
                 block,
@@ -384,7 +387,7 @@ impl Picture {
                 self.place_plain(data, row, &header);
             } else if header.compression == 0 {
                 return Err(damaged("it has another length than its rows"));
-            } else if !can_hold(data, size) {
+            } else if !can_hold(data.len() as u64, size as u64) {
                 return Err(damaged("it promises more pixels than its bytes can hold"));
             } else {
                 scratch.packed.resize(size, 0);
@@ -399,8 +402,9 @@ impl Picture {
                 undo_differences(&mut scratch.packed);
                 self.place_split(&scratch.packed, row, &header, &mut scratch.halves);
             }
+            dead += self.dead(row * header.width..(row + rows) * header.width);
         }
-        Ok(())
+        Ok(dead)
     }
 
     /// Puts rows of plain little-endian values where they belong.
@@ -514,10 +518,9 @@ impl Picture {
         Ok(())
     }
 
-    /// Pixels with a channel that is not finite.
-    #[must_use]
-    pub fn dead(&self) -> usize {
-        let [red, green, blue] = &self.planes;
+    /// How many of these pixels have a channel that is not finite.
+    fn dead(&self, of: Range<usize>) -> usize {
+        let [red, green, blue] = self.planes.each_ref().map(|plane| &plane[of.clone()]);
         // x · 0 is 0 for every finite x and NaN for every other: a sum that needs no branch.
         let dead =
             |((r, g), b): ((&f32, &f32), &f32)| usize::from((r * 0.0 + g * 0.0 + b * 0.0) != 0.0);

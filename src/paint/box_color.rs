@@ -19,6 +19,12 @@ const THIN: f64 = 2e-3;
 /// Mean linear sRGB of colors uniform in a Lab box. Corners may be given in any order.
 #[must_use]
 pub fn mean_color(lower: [f32; 3], upper: [f32; 3]) -> LinearRgb {
+    xyz_to_rgb(mean_xyz(lower, upper))
+}
+
+/// The same mean in XYZ, white of Y = 1: what is summed over many boxes need be taken to sRGB only once.
+#[must_use]
+pub(super) fn mean_xyz(lower: [f32; 3], upper: [f32; 3]) -> [f64; 3] {
     let lo = lower.map(f64::from);
     let hi = upper.map(f64::from);
     // Lab of magnitudes below 2^1023: the plain sum is the midpoint.
@@ -29,11 +35,11 @@ pub fn mean_color(lower: [f32; 3], upper: [f32; 3]) -> LinearRgb {
     let (y, dy) = ((center[0] + 16.0) * (1.0 / 116.0), half[0] * (1.0 / 116.0));
     let (u, du) = (center[1] * (1.0 / 500.0), half[1] * (1.0 / 500.0));
     let (v, dv) = (center[2] * (1.0 / 200.0), half[2] * (1.0 / 200.0));
-    xyz_to_rgb([
+    [
         D65_2.x * mean_of_sum(y + u, dy, du),
         D65_2.y * mean_of_sum(y, dy, 0.0),
         D65_2.z * mean_of_sum(y - v, dy, dv),
-    ])
+    ]
 }
 
 /// Middle of the box of these half widths in Lab whose mean linear sRGB this is: the inverse of [`mean_color`].

@@ -84,18 +84,34 @@ pub struct Reader<'a> {
     index: usize,
 }
 
+/// Where the arrays of a body go: into a file, or into the hash of what a file would hold.
+pub(super) trait Arrays {
+    /// Takes bytes in.
+    fn take(&mut self, bytes: &[u8]);
+
+    /// Takes an array in.
+    fn array<T: Pod>(&mut self, values: &[T]) {
+        self.take(&(values.len() as u64).to_le_bytes());
+        self.take(bytemuck::cast_slice(values));
+    }
+}
+
+impl Arrays for Writer {
+    fn take(&mut self, bytes: &[u8]) {
+        self.body.extend_from_slice(bytes);
+    }
+}
+
+impl Arrays for blake3::Hasher {
+    fn take(&mut self, bytes: &[u8]) {
+        self.update(bytes);
+    }
+}
+
 impl Writer {
     /// Appends an array.
     pub fn array<T: Pod>(&mut self, values: &[T]) {
-        self.body
-            .extend_from_slice(&(values.len() as u64).to_le_bytes());
-        self.body.extend_from_slice(bytemuck::cast_slice(values));
-    }
-
-    /// The body so far.
-    #[must_use]
-    pub fn body(&self) -> &[u8] {
-        &self.body
+        Arrays::array(self, values);
     }
 
     /// The whole file.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::container::{Container, ContainerError, Writer};
+use super::container::{Arrays, Container, ContainerError, Writer};
 use super::energy::EnergyCertificate;
 use super::{
     AngleGrid, CarPaint, ClusteringError, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes,
@@ -190,7 +190,7 @@ impl PhysicalHeader {
     }
 }
 
-fn write_arrays(paint: &CarPaint, writer: &mut Writer) {
+fn write_arrays(paint: &CarPaint, writer: &mut impl Arrays) {
     let nodes: Vec<[f64; 3]> = paint
         .color_table
         .nodes()
@@ -214,13 +214,11 @@ impl CarPaint {
     /// Never: plain data serialises.
     #[must_use]
     pub fn content_hash(&self) -> blake3::Hash {
-        let mut writer = Writer::default();
-        write_arrays(self, &mut writer);
         let mut hasher = blake3::Hasher::new();
         hasher.update(&VERSION.to_le_bytes());
         hasher
             .update(&serde_json::to_vec(&PhysicalHeader::of(self)).expect("plain data serialises"));
-        hasher.update(writer.body());
+        write_arrays(self, &mut hasher);
         hasher.finalize()
     }
 }
@@ -277,8 +275,8 @@ impl PaintFile {
             Some(flakes) => Some(Flakes {
                 theta_h: flakes.theta_h_deg,
                 theta_d: flakes.theta_d_deg,
-                offsets: reader.array()?,
-                probability: reader.array()?,
+                offsets: reader.array()?.into(),
+                probability: reader.array()?.into(),
                 lower: reader.array()?,
                 upper: reader.array()?,
                 texture: flakes.texture,

@@ -7,8 +7,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::angle::AngleGrid;
-use super::box_color::mean_color;
-use crate::color::LinearRgb;
+use super::box_color::mean_xyz;
+use super::shared_list::SharedList;
+use crate::color::{LinearRgb, xyz_to_rgb};
 
 /// The flakes of a paint.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,9 +19,9 @@ pub struct Flakes {
     /// Difference angles of the slices.
     pub theta_d: AngleGrid,
     /// First cluster of each slice, θd fastest, and one past the last: `theta_h.len() * theta_d.len() + 1` numbers.
-    pub offsets: Vec<u32>,
+    pub offsets: SharedList<u32>,
     /// Probability of each cluster; sums to 1 in every slice.
-    pub probability: Vec<f64>,
+    pub probability: SharedList<f64>,
     /// Corner of smallest L, a, b of each box.
     pub lower: Vec<[f32; 3]>,
     /// Corner of largest L, a, b of each box.
@@ -89,8 +90,8 @@ impl Flakes {
         let mut kept = Self {
             theta_h: self.theta_h.at(theta_h),
             theta_d: self.theta_d.at(theta_d),
-            offsets: vec![0],
-            probability: Vec::new(),
+            offsets: vec![0].into(),
+            probability: SharedList::default(),
             lower: Vec::new(),
             upper: Vec::new(),
             texture: self.texture,
@@ -141,14 +142,20 @@ impl Slice<'_> {
     /// Mean flake reflectance of the slice in 1/sr, in closed form; may be slightly negative where the sensor was.
     #[must_use]
     pub fn mean(&self) -> LinearRgb {
+        self.mean_of_boxes(|_| ())
+    }
+
+    /// [`Slice::mean`]; `each` hears the mean luminance, of π f, of every cluster in turn.
+    pub(crate) fn mean_of_boxes(&self, mut each: impl FnMut(f64)) -> LinearRgb {
         let mut sum = [0.0; 3];
         for ((p, &lower), &upper) in self.probability.iter().zip(self.lower).zip(self.upper) {
-            let color = mean_color(lower, upper);
+            let xyz = mean_xyz(lower, upper);
+            each(xyz[1]);
             for k in 0..3 {
-                sum[k] += p * color[k];
+                sum[k] += p * xyz[k];
             }
         }
-        sum.map(|s| s / std::f64::consts::PI)
+        xyz_to_rgb(sum).map(|s| s / std::f64::consts::PI)
     }
 
     /// Middle of a box in Lab.

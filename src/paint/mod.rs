@@ -23,9 +23,11 @@ mod flakes;
 mod lightness;
 mod limits;
 mod lobe;
+mod magnitude;
 mod realisation;
 mod reflectance;
 mod residuals;
+mod shared_list;
 mod sparkle;
 mod validate;
 
@@ -44,12 +46,14 @@ pub use flakes::{FlakeTexture, Flakes, Slice};
 pub use lightness::LightnessMixture;
 pub use limits::Limits;
 pub use lobe::Lobe;
+pub(crate) use magnitude::largest_magnitude;
 pub use realisation::{Clamp, Realisation};
 pub use reflectance::{Chi, Reflectance, Terms};
 pub use residuals::{
     ClusteringError, FitResiduals, InstrumentError, LuminanceError, Percentiles, ReadingError,
     ReadingResiduals,
 };
+pub use shared_list::SharedList;
 pub use sparkle::{FlakeSampler, TexelDraw, cumulative};
 pub use validate::{MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError};
 

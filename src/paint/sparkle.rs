@@ -283,10 +283,10 @@ mod tests {
         let flakes = Flakes {
             theta_h: AngleGrid::single(),
             theta_d: AngleGrid::single(),
-            offsets: vec![0, 2],
+            offsets: vec![0, 2].into(),
             lower: vec![[10.0; 3], [90.0, 0.0, 0.0]],
             upper: vec![[10.0; 3], [90.0, 0.0, 0.0]],
-            probability: vec![0.5, 0.5],
+            probability: vec![0.5, 0.5].into(),
             texture: FlakeTexture {
                 texel_um: 20.0,
                 grain_um: 20.0,

@@ -344,8 +344,8 @@ mod tests {
                 flakes: Some(Flakes {
                     theta_h: AngleGrid::new(vec![0.0, 10.0, 20.0]).expect("ascending"),
                     theta_d: AngleGrid::single(),
-                    offsets,
-                    probability: vec![1.0; 4],
+                    offsets: offsets.into(),
+                    probability: vec![1.0; 4].into(),
                     lower: vec![[0.0; 3]; 4],
                     upper: vec![[1.0; 3]; 4],
                     texture: FlakeTexture {

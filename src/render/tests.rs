@@ -18,8 +18,8 @@ fn sparkling() -> CarPaint {
     let flakes = Flakes {
         theta_h: AngleGrid::single(),
         theta_d: AngleGrid::single(),
-        offsets: vec![0, 2],
-        probability: vec![0.95, 0.05],
+        offsets: vec![0, 2].into(),
+        probability: vec![0.95, 0.05].into(),
         lower: vec![[5.0, 0.0, 0.0], [120.0, 0.0, 0.0]],
         upper: vec![[9.0, 0.0, 0.0], [160.0, 0.0, 0.0]],
         texture: FlakeTexture {

@@ -23,8 +23,8 @@ use super::works::{Thing, Works};
 use crate::blend::Blend;
 use crate::paint::PaintFile;
 use crate::store::{
-    BlendRecord, Blobs, CachedResult, Catalogue, FolderBlobs, Hash, PaintRecord, ResultCache,
-    SqliteCatalogue, StoreError, Visibility,
+    BlendRecord, BlobBytes, Blobs, CachedResult, Catalogue, FolderBlobs, Hash, PaintRecord,
+    ResultCache, SqliteCatalogue, StoreError, Visibility,
 };
 
 /// A running service, shared by its handlers.
@@ -364,6 +364,21 @@ impl App {
         };
         self.catalogue.add_paint(&record).await?;
         Ok(())
+    }
+
+    /// A blob that the record of a paint names, to be streamed.
+    ///
+    /// # Errors
+    ///
+    /// [`Kind::UnknownPaint`] when the paint was deleted a moment ago.
+    pub async fn stream_of(&self, id: &str, blob: Hash) -> Result<BlobBytes, Problem> {
+        // An open blob can be read to its end, whatever becomes of its name.
+        let _reading = self.removal.read().await;
+        match self.blobs.stream(blob).await? {
+            Some(bytes) => Ok(bytes),
+            None if self.catalogue.paint(id).await?.is_none() => Err(unknown_paint(id)),
+            None => Err(Problem::internal(format!("a blob of {id} is not there"))),
+        }
     }
 
     /// Forgets a paint and every blob that nothing else names.

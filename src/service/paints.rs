@@ -541,8 +541,7 @@ pub async fn file(
     _: NoQuery,
 ) -> Result<Answer, Problem> {
     let paint = app.paint(&id).await?;
-    let missing = || Problem::internal(format!("the file of {id} is not there"));
-    let blob = app.blobs.stream(paint.file).await?.ok_or_else(missing)?;
+    let blob = app.stream_of(&id, paint.file).await?;
     Ok(
         Answer::blob(Format::Paint.media_type(), paint.file, blob, paint.keep())
             .saved_as(&format!("{id}.paint")),
@@ -571,8 +570,7 @@ pub async fn measurement(
         )
     };
     let upload = paint.measurement.ok_or_else(none)?;
-    let missing = || Problem::internal(format!("the measurement of {id} is not there"));
-    let blob = app.blobs.stream(upload).await?.ok_or_else(missing)?;
+    let blob = app.stream_of(&id, upload).await?;
     Ok(
         Answer::blob("application/octet-stream", upload, blob, Keep::Own)
             .saved_as(&format!("{id}.measurement")),

@@ -154,10 +154,25 @@ pub fn ingest(
     options: &IngestOptions,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<PaintFile, WorkshopError> {
+    ingest_in_stages(path, options, progress, &|_| ())
+}
+
+/// The same, telling `ended` the name of each stage when it is over: `open`, `hash`, `base`, `flakes`, `error` (what the
+/// clusters miss of the pictures), `certificate`. Stages that a measurement does not need are not told.
+///
+/// # Errors
+///
+/// As [`ingest`].
+pub fn ingest_in_stages(
+    path: &Path,
+    options: &IngestOptions,
+    progress: &(dyn Fn(f32) + Sync),
+    ended: &dyn Fn(&'static str),
+) -> Result<PaintFile, WorkshopError> {
     let stem = path
         .file_stem()
         .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    ingest_called(path, options, |_| stem, progress)
+    ingest_called(path, options, |_| stem, progress, ended)
 }
 
 /// Fits a measurement that has no name of its own as what `unnamed` calls it.
@@ -166,6 +181,7 @@ fn ingest_called(
     options: &IngestOptions,
     unnamed: impl FnOnce(&BareMeasurement) -> String,
     progress: &(dyn Fn(f32) + Sync),
+    ended: &dyn Fn(&'static str),
 ) -> Result<PaintFile, WorkshopError> {
     if let Some(name) = &options.name {
         let length = name.chars().count();
@@ -178,15 +194,18 @@ fn ingest_called(
             return Err(WorkshopError::usage("name", problem));
         }
     }
-    let file = match open_measurement(path, options)? {
+    let opened = open_measurement(path, options)?;
+    ended("open");
+    let file = match opened {
         Measurement::Brdf(bare) => {
             let named = options.name.clone();
             let name = named.unwrap_or_else(|| as_name(&unnamed(&bare), bare.layout));
-            ingest_brdf(&bare, name, options, progress)
+            ingest_brdf(&bare, name, options, progress, ended)
         }
         Measurement::Package(package) => {
             let hash = content_hash(path, &options.limits)?;
-            ingest_package(*package, hash, options, progress)
+            ended("hash");
+            ingest_package(*package, hash, options, progress, ended)
         }
     }
     .map_err(|problem| WorkshopError::input(path.display(), problem))?;
@@ -217,7 +236,7 @@ pub fn ingest_upload(
         // The file is called by the hash of its bytes, which is no name: better what it says about itself.
         let description =
             |bare: &BareMeasurement| bare.brdf.description().unwrap_or_default().to_owned();
-        return ingest_called(path, options, description, progress).map_err(named);
+        return ingest_called(path, options, description, progress, &|_| ()).map_err(named);
     }
     options.check_measured()?;
     // It is held in memory as a whole, as a table is.
@@ -260,12 +279,14 @@ fn ingest_brdf(
     name: String,
     options: &IngestOptions,
     progress: &(dyn Fn(f32) + Sync),
+    ended: &dyn Fn(&'static str),
 ) -> Result<PaintFile, String> {
     let brdf = &bare.brdf;
     let coat = options
         .coat_ior
         .map_or(CoatChoice::ByResidual, CoatChoice::Ior);
     let base = fit_base_telling(brdf, coat, progress).map_err(|e| e.to_string())?;
+    ended("base");
     let mut warnings = brdf.warnings();
     warnings.extend(base.warnings.iter().cloned());
     let mut provenance = Provenance {
@@ -279,14 +300,16 @@ fn ingest_brdf(
             .insert("description".to_owned(), description.to_owned());
     }
     let coat = base.coat;
-    Ok(finish(
+    let file = finish(
         name,
         provenance,
         base_paint(&base, coat),
         Some(base.residuals),
         None,
         warnings,
-    ))
+    );
+    ended("certificate");
+    Ok(file)
 }
 
 fn ingest_package(
@@ -294,6 +317,7 @@ fn ingest_package(
     hash: blake3::Hash,
     options: &IngestOptions,
     progress: &(dyn Fn(f32) + Sync),
+    ended: &dyn Fn(&'static str),
 ) -> Result<PaintFile, String> {
     let mut warnings = package.warnings.clone();
     let mut residuals = None;
@@ -338,6 +362,7 @@ fn ingest_package(
             base_paint(&base, coat)
         }
     };
+    ended("base");
     let mut clustering = None;
     if let Some(pictures) = &package.flakes {
         let tell = |done: usize, of: usize| {
@@ -349,10 +374,12 @@ fn ingest_package(
             fit_flakes(pictures, &options.profile.flakes, &tell).map_err(|e| e.to_string())?;
         warnings.extend(fitted.warnings);
         paint.flakes = Some(fitted.flakes);
+        ended("flakes");
         clustering = Some(Clustering {
             error: clustering_error(pictures, &paint),
             ..fitted.clustering
         });
+        ended("error");
     }
     let provenance = Provenance {
         source: Layout::Package.name().to_owned(),
@@ -366,6 +393,7 @@ fn ingest_package(
         .as_ref()
         .and_then(|readings| against_readings(&paint, readings));
     let file = finish(name, provenance, paint, residuals, clustering, warnings);
+    ended("certificate");
     Ok(PaintFile { readings, ..file })
 }
 

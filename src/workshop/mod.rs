@@ -30,7 +30,7 @@ pub use estimate::{Estimate, EstimatedError, Stage, Work, sample_to_estimate};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{
     BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, check_clusters, ingest,
-    ingest_upload, open_measurement,
+    ingest_in_stages, ingest_upload, open_measurement,
 };
 pub use previewing::{Light, PictureFormat, PreviewOptions, preview, read_environment, texels};
 pub use reading::{MOST_ANGLES, readings};

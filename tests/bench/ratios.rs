@@ -16,7 +16,7 @@ use std::time::Instant;
 use carpaint::accuracy::Profile;
 use carpaint::blend::{Blend, RealisationWeights};
 use carpaint::export::{About, bundle, glb};
-use carpaint::paint::{PaintFile, Provenance};
+use carpaint::paint::{Flakes, PaintFile, Provenance};
 use carpaint::workshop::{IngestOptions, blend_paints, ingest};
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -57,13 +57,13 @@ fn main() -> Outcome<()> {
     if wanted("bundle") {
         let bytes = bundle(&realised, &about, &settings)?;
         let ours = cpu(9, || bundle(&realised, &about, &settings).map(|b| b.len()));
-        let copy = cpu(9, || black_box(&bytes).clone().len());
+        let copy = cpu(9, || black_box(black_box(&bytes).clone()).len());
         row("realisation to bundle bytes", ours, "copying them", copy);
     }
     if wanted("glb") {
         let bytes = glb(&realised, &about, &settings)?;
         let ours = cpu(9, || glb(&realised, &about, &settings).map(|b| b.len()));
-        let copy = cpu(9, || black_box(&bytes).clone().len());
+        let copy = cpu(9, || black_box(black_box(&bytes).clone()).len());
         row("realisation to GLB bytes", ours, "copying them", copy);
     }
     Ok(())
@@ -127,11 +127,22 @@ fn blended(paints: &[PaintFile]) -> Outcome<Blend> {
 /// Blending again what is already ingested; all cores.
 fn again(paints: &[PaintFile]) -> Outcome<()> {
     let slices = blended(paints)?.report().slices;
-    let mut seconds = Vec::new();
+    let (mut seconds, mut busy) = (Vec::new(), Vec::new());
     for _ in 0..15 {
-        let begin = Instant::now();
+        let (begin, before) = (Instant::now(), seconds_of_all_threads());
         black_box(blended(paints)?);
         seconds.push(begin.elapsed().as_secs_f64());
+        busy.extend(
+            before
+                .zip(seconds_of_all_threads())
+                .map(|(before, after)| after - before),
+        );
+    }
+    if !busy.is_empty() {
+        let each = median(busy) * 1e3;
+        println!(
+            "| of which processor time, all threads together | {each:.1} ms | | | processor |"
+        );
     }
     let limit = 0.030 * slices as f64 / 576.0;
     println!(
@@ -143,37 +154,72 @@ fn again(paints: &[PaintFile]) -> Outcome<()> {
     Ok(())
 }
 
-/// A realisation in memory beside a·X + b·Y over the same bytes.
+/// Realisations in memory, each beside a·X + b·Y over the same bytes: the boxes of every paint are read and one set of
+/// boxes, six numbers a cluster, is written. Peers write to new memory where ours does, and else to memory used before.
 fn realise(blend: &Blend) -> Outcome<()> {
-    let count = blend.ingredients().count();
-    let weights = RealisationWeights::even(vec![1.0 / count as f64; count]);
-    let clusters = blend
-        .realise(&weights)?
-        .paint
-        .flakes
-        .map_or(0, |f| f.clusters());
-    let ours = cpu(15, || blend.realise(&weights).map(|r| r.paint.lobes.len()));
-    // The boxes of every paint are read and one set of boxes is written: six numbers a cluster.
+    let count = blend.len();
+    let even = 1.0 / count as f64;
+    let mut outside = vec![-0.3 / (count - 1) as f64; count];
+    outside[0] = 1.3;
+    let weights = RealisationWeights::even(vec![even; count]);
+    let first = blend.realise(&weights)?;
+    let clusters = first.paint.flakes.as_ref().map_or(0, Flakes::clusters);
     let inputs: Vec<Vec<f32>> = (0..count)
         .map(|k| (0..clusters * 6).map(|i| (i % 97 + k) as f32).collect())
         .collect();
-    let loop_only = cpu(15, || {
+    let w = even as f32;
+
+    let ours = cpu(25, || black_box(blend.realise(&weights)).is_ok());
+    let peer = cpu(25, || {
         let (x, y) = (black_box(&inputs[0]), black_box(&inputs[1]));
-        let mut out: Vec<f32> = x.iter().zip(y).map(|(x, y)| 0.5 * x + 0.5 * y).collect();
-        for z in &inputs[2..] {
-            for (o, z) in out.iter_mut().zip(black_box(z)) {
-                *o += 0.5 * z;
-            }
+        let mut out: Vec<f32> = x.iter().zip(y).map(|(x, y)| w * x + w * y).collect();
+        add(&mut out, &inputs[2..], w);
+        black_box(out).len()
+    });
+    let label = format!("one realisation, {clusters} clusters, in new memory");
+    row(&label, ours, "a·X + b·Y", peer);
+
+    let mut out = vec![0.0; 6 * clusters];
+    let peer = cpu(25, || {
+        let (x, y) = (black_box(&inputs[0]), black_box(&inputs[1]));
+        for ((out, x), y) in out.iter_mut().zip(x).zip(y) {
+            *out = w * x + w * y;
         }
+        add(&mut out, &inputs[2..], w);
         black_box(&out).len()
     });
-    row(
-        &format!("one realisation, {clusters} clusters"),
-        ours,
-        "a·X + b·Y",
-        loop_only,
-    );
+    let pale = RealisationWeights {
+        flake_saturation: 0.5,
+        ..weights.clone()
+    };
+    let mut old = Some(first);
+    for (what, weights) in [
+        ("", weights),
+        (", weights outside 0..1", RealisationWeights::even(outside)),
+        (", half the saturation", pale),
+    ] {
+        let ours = cpu(25, || {
+            old = old
+                .take()
+                .and_then(|old| blend.realise_over(&weights, old).ok());
+            old.is_some()
+        });
+        row(
+            &format!("the next realisation{what}"),
+            ours,
+            "a·X + b·Y",
+            peer,
+        );
+    }
     Ok(())
+}
+
+fn add(out: &mut [f32], inputs: &[Vec<f32>], weight: f32) {
+    for z in inputs {
+        for (out, z) in out.iter_mut().zip(black_box(z)) {
+            *out += weight * z;
+        }
+    }
 }
 
 /// Seconds of processor time of a step: the median of `batches`, each of as many runs as fill 60 ms, for the scheduler
@@ -198,7 +244,17 @@ fn cpu<T>(batches: usize, mut step: impl FnMut() -> T) -> f64 {
 
 /// Processor seconds of this thread so far.
 fn thread_seconds() -> Option<f64> {
-    let account = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    seconds_of(Path::new("/proc/thread-self"))
+}
+
+/// Processor seconds of all threads so far, as long as none has ended.
+fn seconds_of_all_threads() -> Option<f64> {
+    let threads = std::fs::read_dir("/proc/self/task").ok()?;
+    threads.map(|thread| seconds_of(&thread.ok()?.path())).sum()
+}
+
+fn seconds_of(thread: &Path) -> Option<f64> {
+    let account = std::fs::read_to_string(thread.join("schedstat")).ok()?;
     let nanoseconds: u64 = account.split_whitespace().next()?.parse().ok()?;
     Some(nanoseconds as f64 * 1e-9)
 }

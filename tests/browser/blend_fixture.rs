@@ -143,7 +143,7 @@ fn copper() -> Result<CarPaint, Anything> {
         .filter(|k| k / columns % 2 == 0 && k % columns % 2 == 0)
         .collect();
     let old = flakes.clone();
-    (flakes.offsets, flakes.probability) = (vec![0], Vec::new());
+    (flakes.offsets, flakes.probability) = (vec![0].into(), vec![].into());
     (flakes.lower, flakes.upper) = (Vec::new(), Vec::new());
     for k in kept {
         let slice = old.slice_at(k);

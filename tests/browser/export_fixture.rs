@@ -168,8 +168,8 @@ fn silver() -> Result<CarPaint, Anything> {
     let mut flakes = Flakes {
         theta_h,
         theta_d,
-        offsets: vec![0],
-        probability: vec![],
+        offsets: vec![0].into(),
+        probability: vec![].into(),
         lower: vec![],
         upper: vec![],
         texture: FlakeTexture {

@@ -261,7 +261,7 @@ fn masses_of_a_millionth_of_a_millionth_are_not_lost() {
     let mut a = metallic(31, &[0.0], &[0.0]);
     let mut masses = [1e-12; 7];
     masses[3] = 1.0 - 6e-12;
-    a.flakes.as_mut().expect("has flakes").probability = masses.to_vec();
+    a.flakes.as_mut().expect("has flakes").probability = masses.to_vec().into();
     let b = metallic(32, &[0.0], &[0.0]);
     let blend = blend(&[&a, &b]);
     let back = realise(&blend, &[1.0, 0.0]).paint;

@@ -71,7 +71,7 @@ pub fn metallic(seed: u64, theta_h: &[f64], theta_d: &[f64]) -> CarPaint {
     let mut random = Stream(seed);
     let mut made = flakes(theta_h, theta_d, &[]);
     made.texture.grain_um = random.within(20.0, 60.0);
-    made.offsets = vec![0];
+    made.offsets = vec![0].into();
     for _ in 0..made.slices() {
         let masses: Vec<f64> = (0..7).map(|_| random.within(0.05, 1.0)).collect();
         let sum: f64 = masses.iter().sum();

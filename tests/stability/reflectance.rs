@@ -322,7 +322,7 @@ fn a_slice_that_is_missing_is_refused_by_its_number() {
     );
     // The third slice has no cluster.
     let mut empty = whole;
-    empty.offsets = vec![0, 1, 2, 2, 4];
+    empty.offsets = vec![0, 1, 2, 2, 4].into();
     metallic.flakes = Some(empty);
     let error = metallic.validate(&Limits::default()).expect_err("refused");
     assert!(
