@@ -105,9 +105,16 @@ impl Clusterer {
         planes: [&[f32]; 3],
         settings: &ClusterSettings,
     ) -> Result<SliceClusters, NoTexel> {
-        if let Some(clusters) = self.cluster_by_sample(planes, settings) {
-            return Ok(clusters);
-        }
+        self.cluster_by_sample(planes, settings)
+            .map_or_else(|| self.cluster_all(planes, settings), Ok)
+    }
+
+    /// Clusters with every texel at hand.
+    fn cluster_all(
+        &mut self,
+        planes: [&[f32]; 3],
+        settings: &ClusterSettings,
+    ) -> Result<SliceClusters, NoTexel> {
         let pixels = planes[0].len();
         let (dead, beyond) = take_in(planes, &mut self.texels, &mut self.light);
         if self.texels.is_empty() {

@@ -183,13 +183,34 @@ pub(super) fn take_in(
     texels.reserve(planes[0].len());
     light.clear();
     light.reserve(planes[0].len());
-    let (mut lot, mut beyond) = (Lot::EMPTY, 0);
-    for planes in lots(planes) {
-        lot.take(planes);
-        beyond += lot.beyond;
-        push(&lot, texels, light);
-    }
+    let beyond = pulp::Arch::new().dispatch(Conversion {
+        planes,
+        texels: &mut *texels,
+        light,
+    });
     (planes[0].len() - texels.len(), beyond)
+}
+
+/// All lots of a picture, with the widest instructions of the machine, which give the same bits as any others.
+struct Conversion<'a> {
+    planes: [&'a [f32]; 3],
+    texels: &'a mut Vec<Texel>,
+    light: &'a mut Vec<[f32; 4]>,
+}
+
+impl pulp::NullaryFnOnce for Conversion<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn call(self) -> usize {
+        let (mut lot, mut beyond) = (Lot::EMPTY, 0);
+        for planes in lots(self.planes) {
+            lot.take(planes);
+            beyond += lot.beyond;
+            push(&lot, self.texels, self.light);
+        }
+        beyond
+    }
 }
 
 /// Adds the finite texels of a lot, and what the picture says of all.

@@ -227,9 +227,15 @@ impl Clusterer {
         self.crowd
             .split(&mut self.texels[..crowd], most - taken.len());
         let ways = Ways::of(&self.crowd);
+        self.passage.begin(&self.crowd);
+        pulp::Arch::new().dispatch(Pass {
+            passage: &mut self.passage,
+            planes,
+            ways: &ways,
+            least,
+            rule: settings.box_rule,
+        });
         let passage = &mut self.passage;
-        passage.begin(&self.crowd);
-        passage.pass(planes, &ways, least, settings.box_rule);
 
         let ends = bright_groups(pixels - passage.dead, bright);
         let taken = ends.last().copied().unwrap_or(0);
@@ -273,6 +279,25 @@ impl Clusterer {
             lot.take(together.each_ref().map(<[f32; LANES]>::as_slice));
             push(&lot, &mut self.texels, &mut self.light);
         }
+    }
+}
+
+/// [`Passage::pass`] with the widest instructions of the machine, which give the same bits as any others.
+struct Pass<'a> {
+    passage: &'a mut Passage,
+    planes: [&'a [f32]; 3],
+    ways: &'a Ways,
+    least: f32,
+    rule: BoxRule,
+}
+
+impl pulp::NullaryFnOnce for Pass<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.passage
+            .pass(self.planes, self.ways, self.least, self.rule);
     }
 }
 

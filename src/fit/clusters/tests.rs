@@ -307,3 +307,82 @@ fn clusters_ascend_in_lightness_and_room_used_before_changes_nothing() {
     let light = |k: usize| alone.lower[k][0] + alone.upper[k][0];
     assert!((1..alone.probability.len()).all(|k| light(k - 1) <= light(k)));
 }
+
+/// The same picture by sample and with every texel at hand.
+fn both_ways(pixels: &[[f32; 3]], settings: &ClusterSettings) -> [SliceClusters; 2] {
+    let plane = |k: usize| -> Vec<f32> { pixels.iter().map(|p| p[k]).collect() };
+    let planes = [plane(0), plane(1), plane(2)];
+    let planes = planes.each_ref().map(Vec::as_slice);
+    let mut room = Clusterer::default();
+    let sampled = room.cluster_by_sample(planes, settings);
+    let all = room.cluster_all(planes, settings);
+    [sampled.expect("large enough"), all.expect("has texels")]
+}
+
+#[test]
+fn a_sample_finds_borders_as_good_as_all_texels_do() {
+    for (rule, clusters) in [
+        (BoxRule::Moments, 50),
+        (BoxRule::Tight, 50),
+        (BoxRule::Moments, 100),
+    ] {
+        let settings = ClusterSettings {
+            clusters,
+            box_rule: rule,
+            ..ClusterSettings::default()
+        };
+        let pixels = sparkling(70_001, 13);
+        let [sampled, all] = both_ways(&pixels, &settings);
+        assert!(sampled.probability.len() <= clusters);
+        assert!(
+            sampled.w1_bound < 1.03 * all.w1_bound,
+            "{} instead of {}",
+            sampled.w1_bound,
+            all.w1_bound
+        );
+        if rule == BoxRule::Moments {
+            assert_mean(&sampled, &pixels);
+        }
+        // The brightest are not sampled: their clusters are the same ones.
+        for back in 1..=8 {
+            let of = |c: &SliceClusters| {
+                let k = c.probability.len() - back;
+                (c.probability[k], c.lower[k], c.upper[k])
+            };
+            assert_eq!(of(&sampled), of(&all), "{back} from the lightest");
+        }
+    }
+}
+
+#[test]
+fn a_large_picture_of_one_color_is_one_cluster_and_its_dead_are_counted() {
+    let mut pixels = vec![[0.2, 0.1, 0.05]; 60_000];
+    pixels[12_345][1] = f32::NAN;
+    pixels[59_999] = [f32::INFINITY; 3];
+    let clusters = cluster(&pixels);
+    assert_eq!(
+        (clusters.probability.as_slice(), clusters.dead),
+        (&[1.0][..], 2)
+    );
+    assert_mean(&clusters, &pixels);
+}
+
+#[test]
+fn flakes_that_a_sample_misses_are_found_all_the_same() {
+    // All in one corner, and too few for a share of any sample; then so many that they are not only the brightest.
+    for bright in [3, 300, 5000] {
+        let mut pixels = vec![[0.01_f32, 0.012, 0.011]; 65_536];
+        for (k, pixel) in pixels[..bright].iter_mut().enumerate() {
+            *pixel = [0.5 + 1e-4 * k as f32; 3];
+        }
+        let plane = |k: usize| -> Vec<f32> { pixels.iter().map(|p| p[k]).collect() };
+        let planes = [plane(0), plane(1), plane(2)];
+        let planes = planes.each_ref().map(Vec::as_slice);
+        let settings = ClusterSettings::default();
+        let all = Clusterer::default().cluster_all(planes, &settings);
+        let (found, all) = (cluster(&pixels), all.expect("has texels"));
+        assert_mean(&found, &pixels);
+        let lightest = |c: &SliceClusters| (c.probability.last().copied(), c.upper.last().copied());
+        assert_eq!(lightest(&found), lightest(&all), "{bright}");
+    }
+}
