@@ -168,6 +168,24 @@ pub(super) fn fit_shape(
     bare: Option<&Shape>,
     tell: Tell<'_>,
 ) -> Option<Shape> {
+    let from = |targets: &[Target], epsilon: f64| {
+        let mut starts = starts(search, targets, epsilon);
+        if let Some(bare) = bare {
+            starts.extend(starts_from(bare, search));
+        }
+        starts
+    };
+    fit_shape_from(from, samples, search, unit, tell)
+}
+
+/// [`fit_shape`] from starts of the caller's choice, which he makes of the samples and the luminance that counts as dark.
+fn fit_shape_from(
+    starts: impl FnOnce(&[Target], f64) -> Vec<Vec<f64>>,
+    samples: &[Sample],
+    search: CoatSearch,
+    unit: f64,
+    tell: Tell<'_>,
+) -> Option<Shape> {
     let epsilon = DARK * unit;
     let near = NEAR_MIRROR_DEG.to_radians();
     let mut targets: Vec<Target> = samples
@@ -215,10 +233,7 @@ pub(super) fn fit_shape(
         bounds: bounds(search, unit),
     };
 
-    let mut starts = starts(search, &targets, epsilon);
-    if let Some(bare) = bare {
-        starts.extend(starts_from(bare, search));
-    }
+    let starts = starts(&targets, epsilon);
     // A finalist has as many samples as several starts.
     let steps = Steps::new(starts.len() + FINALISTS * FINALIST_STEPS, tell);
     let mut found: Vec<Minimum> = starts

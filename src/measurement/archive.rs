@@ -83,6 +83,35 @@ impl Source {
     }
 }
 
+/// How many files the record at the end of a zip archive announces, the large one (zip64) where there is one; 0 where
+/// there is none. APPNOTE 6.3.10, 4.3.14 and 4.3.16.
+fn announced_entries(archive: &mut Cursor) -> io::Result<u64> {
+    let whole = archive.length;
+    let mut tail = Vec::new();
+    archive.seek(SeekFrom::Start(whole.saturating_sub(22 + 65_535)))?;
+    archive.by_ref().take(22 + 65_535).read_to_end(&mut tail)?;
+    archive.seek(SeekFrom::Start(0))?;
+    let Some(at) = tail.windows(4).rposition(|four| four == b"PK\x05\x06") else {
+        return Ok(0);
+    };
+    let count = tail
+        .get(at + 10..at + 12)
+        .map_or(0, |two| u64::from(u16::from_le_bytes([two[0], two[1]])));
+    if count < 0xffff {
+        return Ok(count);
+    }
+    let number = |bytes: &[u8]| bytes.try_into().map_or(0, u64::from_le_bytes);
+    let locator = at.checked_sub(20).map(|from| &tail[from..at]);
+    let Some(locator) = locator.filter(|record| record.starts_with(b"PK\x06\x07")) else {
+        return Ok(count);
+    };
+    let mut record = Vec::new();
+    archive.seek(SeekFrom::Start(number(&locator[8..16])))?;
+    archive.by_ref().take(56).read_to_end(&mut record)?;
+    archive.seek(SeekFrom::Start(0))?;
+    Ok(record.get(32..40).map_or(count, number))
+}
+
 #[cfg(unix)]
 fn read_at(file: &File, into: &mut [u8], offset: u64) -> io::Result<usize> {
     std::os::unix::fs::FileExt::read_at(file, into, offset)
@@ -146,12 +175,20 @@ impl Archive {
         let archive = |error: &dyn std::fmt::Display| PackageError::Archive {
             reason: error.to_string(),
         };
-        let cursor = Cursor::new(source.clone()).map_err(|e| archive(&e))?;
+        let mut cursor = Cursor::new(source.clone()).map_err(|e| archive(&e))?;
         if cursor.length > limits.bytes {
             return Err(PackageError::Size {
                 file: "the package".into(),
                 bytes: cursor.length,
                 accepted: limits.bytes,
+            });
+        }
+        // A directory of millions would be held in memory before it could be counted.
+        let announced = announced_entries(&mut cursor).map_err(|e| archive(&e))?;
+        if announced > limits.entries as u64 {
+            return Err(PackageError::Entries {
+                count: usize::try_from(announced).unwrap_or(usize::MAX),
+                accepted: limits.entries,
             });
         }
         let directory = ZipArchive::new(cursor).map_err(|e| archive(&e))?.metadata();
@@ -321,5 +358,40 @@ mod tests {
         for name in ["../blue/paint.json", "/etc/passwd", "flakes/../../x", ""] {
             assert_eq!(within(folder, name), None, "{name}");
         }
+    }
+
+    /// An archive of nothing that announces so many files.
+    fn announcing(count: u16, large: Option<u64>) -> Bytes {
+        let mut bytes = Vec::new();
+        if let Some(large) = large {
+            bytes.extend(b"PK\x06\x06");
+            bytes.extend([0; 28]);
+            bytes.extend(large.to_le_bytes());
+            bytes.extend([0; 16]);
+            bytes.extend(b"PK\x06\x07\0\0\0\0");
+            bytes.extend([0; 12]);
+        }
+        bytes.extend(b"PK\x05\x06\0\0\0\0");
+        bytes.extend(count.to_le_bytes());
+        bytes.extend(count.to_le_bytes());
+        bytes.extend([0; 10]);
+        bytes.into()
+    }
+
+    #[test]
+    fn files_are_counted_before_the_directory_is_read() {
+        for (count, large, announced) in [
+            (30_000, None, 30_000),
+            (0xffff, None, 0xffff),
+            (0xffff, Some(50_000_000), 50_000_000),
+        ] {
+            let archive = Archive::in_memory(announcing(count, large), &Limits::default());
+            assert!(
+                matches!(archive, Err(PackageError::Entries { count, .. }) if count == announced),
+                "{announced}"
+            );
+        }
+        let mut nothing = Cursor::new(Source::Memory(Bytes::from_static(b"PK"))).expect("opens");
+        assert_eq!(announced_entries(&mut nothing).expect("reads"), 0);
     }
 }

@@ -3,6 +3,7 @@
 use super::*;
 use crate::color::LinearRgb;
 use crate::fit::directions::measure;
+use crate::fit::stream::Stream;
 use crate::measurement::MeasuredBrdf;
 
 struct Known(Shape);
@@ -47,6 +48,36 @@ fn a_model_without_noise_is_found_again() {
         // Weights and Fresnel values trade against each other under a coat; what they reflect does not.
         let worst = worst(&found, &truth, &samples);
         assert!(worst < 0.02, "{coat:?}: {worst}, {found:?}");
+    }
+}
+
+#[test]
+fn twenty_sets_of_other_starts_find_the_same_or_say_that_they_are_alone() {
+    for (coat, most_alone) in [(None, 5), (Some((1.5, 0.03)), 10)] {
+        let truth = known(coat);
+        let samples = measure(&Known(truth.clone()), 4000, 70.0, 3);
+        let search = coat.map_or(CoatSearch::Bare, |c| CoatSearch::Index(c.0));
+        let mut alone = 0;
+        for seed in 0..20 {
+            let mut random = Stream::new(seed);
+            // Every width, weight and Fresnel value of every start, by up to a factor of two either way.
+            let elsewhere = |targets: &[Target], epsilon: f64| {
+                let mut from = starts(search, targets, epsilon);
+                for value in from.iter_mut().flatten() {
+                    *value += random.within(-std::f64::consts::LN_2, std::f64::consts::LN_2);
+                }
+                from
+            };
+            let found = fit_shape_from(elsewhere, &samples, search, 1.0, &|_| ()).expect("a fit");
+            if found.agreeing < 2 {
+                alone += 1;
+                continue;
+            }
+            // As from the house's own starts, above.
+            let worst = worst(&found, &truth, &samples);
+            assert!(worst < 0.02, "{coat:?}, {seed}: {worst}, {found:?}");
+        }
+        assert!(alone <= most_alone, "{coat:?}: {alone} of 20 stood alone");
     }
 }
 

@@ -10,6 +10,9 @@ use crate::workshop::{Thing, WorkshopError};
 /// Pixels on the longer side of the two samples.
 const SIDES: [u32; 2] = [20, 56];
 
+/// Part of a larger sample's time that is at least proportional to the work.
+const LEAST_SHARE: f64 = 0.5;
+
 /// Samples per pixel from which on time is proportional to them.
 const ENOUGH: u32 = 8;
 
@@ -50,11 +53,15 @@ pub fn estimate_preview(
         ));
     }
     let work = width * height * batches(options.samples_per_pixel);
+    // Where something else slowed the smaller sample down, the line through both is flat and promises anything: less
+    // than half of what the larger says by itself is not believed.
+    let least = LEAST_SHARE * samples[1].1 / samples[1].0 * work;
     let seconds = extrapolated(
         (samples[0].0, samples[0].1),
         (samples[1].0, samples[1].1),
         work,
-    );
+    )
+    .max(least);
     let bytes = extrapolated(samples[0].2, samples[1].2, width * height);
     let (_, error) = timed(|| sampling(thing, weights, options, limits));
     let mut stages = vec![Stage {
