@@ -381,7 +381,7 @@ async fn every_refusal_is_a_problem_that_says_where_and_what_instead() {
             vec![],
             400,
             "malformed-request",
-            None,
+            Some(""),
         ),
         (
             "POST",

@@ -3,8 +3,8 @@
 use std::fmt::{Display, Write as _};
 
 use crate::accuracy::{paint_error, sparkle};
-use crate::export::readings;
-use crate::paint::{ASPECULAR_DEG, AngleGrid, Flakes, LuminanceError, PaintFile};
+use crate::paint::{AngleGrid, Flakes, LuminanceError, PaintFile};
+use crate::workshop::readings;
 
 /// Lines of a page: a word on the left, what it is on the right.
 #[derive(Default)]
@@ -81,7 +81,7 @@ pub fn paint_page(file: &PaintFile) -> String {
             table.theta_d().len()
         ),
     );
-    if let Ok(read) = readings(paint, &ASPECULAR_DEG) {
+    if let Ok(read) = readings(file, None) {
         let rows = read.rows.iter().map(|[angle, l, a, b]| {
             format!(
                 "{angle:>6}°   L {l:>7.2}   a {a:>7.2}   b {b:>7.2}{}",

@@ -126,7 +126,8 @@ fn stored() -> Vec<(String, Vec<u8>)> {
         Blocks::Tiles(Vec2(7, 5)),
     ];
     let pixel = |at: Vec2<usize>| {
-        let light = |k: usize| f16::from_f32(((at.x() * 7 + at.y() * 3 + k) % 11) as f32 / 8.0);
+        let light =
+            |k: usize| f16::from_f32(0.5 + ((at.x() * 7 + at.y() * 3 + k) % 11) as f32 / 22.0);
         (light(0), light(1), light(2))
     };
     let mut all = Vec::new();
@@ -162,7 +163,8 @@ fn every_compression_in_lines_and_tiles_reads_as_the_same_sky() {
     let all = stored();
     let whole = level(&all[0].1);
     for (name, bytes) in &all {
-        // B44 keeps six bits of every sixteen pixels' differences; the others keep halves as they are.
+        // B44 keeps six bits of the differences among sixteen pixels. Within one octave they have up to ten, so four
+        // are lost: 16/1024 of a pixel. The others keep halves as they are.
         let loss = if name.starts_with("B44") { 0.02 } else { 0.0 };
         let told = level(bytes);
         assert!(
@@ -181,15 +183,18 @@ fn every_compression_cut_or_swapped_is_an_error_or_a_picture_never_a_panic() {
     let all = stored();
     for (k, (name, whole)) in all.iter().enumerate() {
         let header = whole.len() - whole.len() / 2;
-        for cut in (0..header).step_by(13).chain(header..whole.len()) {
+        for cut in (0..header)
+            .step_by(29)
+            .chain((header..whole.len()).step_by(5))
+        {
             assert!(
                 Environment::from_bytes(&whole[..cut], &limits).is_err(),
                 "{name} cut to {cut} of {}",
                 whole.len()
             );
         }
-        // Every byte of the file turned over in one way, and the data of one put under the head of another.
-        for at in 0..whole.len() {
+        // Bytes all over the file turned over, and the data of one put under the head of another.
+        for at in (k % 7..whole.len()).step_by(7) {
             let mut damaged = whole.clone();
             damaged[at] ^= [0x01, 0x80, 0xff][at % 3];
             let _ = Environment::from_bytes(&damaged, &limits);
