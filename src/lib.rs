@@ -12,6 +12,7 @@ pub mod accuracy;
 pub mod blend;
 pub mod cli;
 pub mod color;
+pub mod descent;
 pub mod export;
 pub mod fit;
 pub mod measurement;

@@ -19,43 +19,133 @@ use crate::transport::{Cost, Method};
 /// Smoothing of a Sinkhorn transport that names none, as a part of the mean cost.
 const EPSILON: f64 = 0.01;
 
+/// Up to here every whole number is one of f64.
+const MOST_WHOLE: f64 = 9_007_199_254_740_992.0;
+
 /// Settings of a profile that were given; the others are the preset's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Knobs {
     /// Where the other knobs stand: `draft`, `standard` or `reference`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::preset",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub preset: Option<Preset>,
     /// Most clusters of a flake slice, 1 to 4096.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::clusters",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub clusters: Option<u32>,
     /// Box of a cluster: `moments` or `tight`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::box_rule",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub box_rule: Option<BoxRule>,
     /// Every so many-th measured angle is used, 1 to 16.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::angle_step",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub angle_step: Option<u32>,
     /// Solver of each slice: `exact`, `sinkhorn` or `greedy`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::transport",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub transport: Option<Transport>,
     /// Smoothing of `sinkhorn`, as a part of the mean cost, 1e-6 to 10.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::epsilon",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub epsilon: Option<f64>,
     /// Cost of moving a color: `distance` in Lab, or `squared`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::cost",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub cost: Option<CostKnob>,
     /// Order in which more than two paints are joined: `canonical` or `cheapest`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::order",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub order: Option<Order>,
     /// Precision of textures: `f32`, `f16` or `8bit`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::precision",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub precision: Option<Precision>,
     /// How a bundle's flakes can be drawn: `alias` table, `inverse_cdf` of 500 steps, or `both`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::draw",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub draw: Option<Draw>,
     /// Samples per pixel of a picture, 1 to 4096.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "read::samples_per_pixel",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub samples_per_pixel: Option<u32>,
+}
+
+/// What a knob can be set to.
+fn accepted(knob: &str) -> &'static str {
+    match knob {
+        "preset" => "draft, standard or reference",
+        "box_rule" => "moments or tight",
+        "angle_step" => "1 to 16",
+        "transport" => "exact, sinkhorn or greedy",
+        "epsilon" => "1e-6 to 10",
+        "cost" => "distance or squared",
+        "order" => "canonical or cheapest",
+        "precision" => "f32, f16 or 8bit",
+        "draw" => "alias, inverse_cdf or both",
+        _ => "1 to 4096",
+    }
+}
+
+/// Readers of the knobs: a value that is none of its knob's is refused by the knob's name.
+mod read {
+    use serde::de::{DeserializeOwned, Error as _};
+    use serde::{Deserialize as _, Deserializer};
+    use serde_json::Value;
+
+    macro_rules! knobs {
+        ($($knob:ident)*) => {$(
+            pub fn $knob<'de, D, T>(deserializer: D) -> Result<Option<T>, D::Error>
+            where
+                D: Deserializer<'de>,
+                T: DeserializeOwned,
+            {
+                let given = Value::deserialize(deserializer)?;
+                serde_json::from_value(given.clone()).map_err(|_| {
+                    let (knob, accepted) = (stringify!($knob), super::accepted(stringify!($knob)));
+                    D::Error::custom(format!("{knob} is {given}, accepted is {accepted}"))
+                })
+            }
+        )*};
+    }
+
+    knobs! {
+        preset clusters box_rule angle_step transport epsilon cost order precision draw samples_per_pixel
+    }
 }
 
 /// Named profiles.
@@ -118,7 +208,7 @@ pub enum ProfileError {
         /// The knob.
         knob: &'static str,
         /// What it was set to.
-        value: f64,
+        value: String,
         /// What would be accepted.
         accepted: &'static str,
     },
@@ -193,26 +283,21 @@ impl Knobs {
     ///
     /// [`ProfileError`] for a value out of range.
     pub fn turned(&self, mut profile: Profile) -> Result<Profile, ProfileError> {
-        let whole = |knob, value: Option<u32>, most: u32, accepted| match value {
+        let whole = |knob, value: Option<u32>, most: u32| match value {
             Some(value) if !(1..=most).contains(&value) => Err(ProfileError::Range {
                 knob,
-                value: f64::from(value),
-                accepted,
+                value: value.to_string(),
+                accepted: accepted(knob),
             }),
             value => Ok(value),
         };
-        if let Some(clusters) = whole("clusters", self.clusters, 4096, "1 to 4096")? {
+        if let Some(clusters) = whole("clusters", self.clusters, 4096)? {
             profile.flakes.clusters = clusters as usize;
         }
-        if let Some(step) = whole("angle_step", self.angle_step, 16, "1 to 16")? {
+        if let Some(step) = whole("angle_step", self.angle_step, 16)? {
             profile.flakes.angle_step = step as usize;
         }
-        if let Some(n) = whole(
-            "samples_per_pixel",
-            self.samples_per_pixel,
-            4096,
-            "1 to 4096",
-        )? {
+        if let Some(n) = whole("samples_per_pixel", self.samples_per_pixel, 4096)? {
             profile.samples_per_pixel = n;
         }
         profile.flakes.box_rule = self.box_rule.unwrap_or(profile.flakes.box_rule);
@@ -235,8 +320,8 @@ impl Knobs {
         if let Some(epsilon) = self.epsilon.filter(|e| !(1e-6..=10.0).contains(e)) {
             return Err(ProfileError::Range {
                 knob: "epsilon",
-                value: epsilon,
-                accepted: "1e-6 to 10",
+                value: format!("{epsilon:?}"),
+                accepted: accepted("epsilon"),
             });
         }
         let method = match self.transport {
@@ -310,13 +395,12 @@ impl FromStr for Knobs {
                 None => return Err(ProfileError::Name(part.to_owned())),
             };
             let read = match value.parse::<f64>() {
-                Ok(number) if number.fract() == 0.0 && (0.0..=1e9).contains(&number) => {
-                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked
-                    let whole = number as u64;
-                    Value::from(whole)
+                Ok(number) if number.fract() == 0.0 && number.abs() <= MOST_WHOLE => {
+                    Value::from(number as i64)
                 }
-                Ok(number) => Value::from(number),
-                Err(_) => Value::from(value),
+                // JSON has no other numbers, and would take them for nothing.
+                Ok(number) if number.is_finite() => Value::from(number),
+                _ => Value::from(value),
             };
             if object.insert(name.to_owned(), read).is_some() {
                 return Err(ProfileError::Knob(format!("{name} is set twice")));
@@ -349,10 +433,33 @@ mod tests {
     fn what_is_no_knob_is_refused_by_name_with_what_there_is() {
         for (text, named) in [
             ("cluster=3", "`clusters`"),
-            ("clusters=many", "many"),
-            ("clusters=0", "1 to 4096"),
-            ("clusters=-1", "-1"),
-            ("transport=magic", "`sinkhorn`"),
+            (
+                "clusters=many",
+                "clusters is \"many\", accepted is 1 to 4096",
+            ),
+            ("clusters=", "clusters is \"\", accepted is 1 to 4096"),
+            ("clusters=nan", "clusters is \"nan\", accepted is 1 to 4096"),
+            ("clusters=0", "clusters is 0, accepted is 1 to 4096"),
+            ("clusters=-1", "clusters is -1, accepted is 1 to 4096"),
+            ("clusters=1.5", "clusters is 1.5, accepted is 1 to 4096"),
+            (
+                "clusters=99999999999",
+                "clusters is 99999999999, accepted is 1 to 4096",
+            ),
+            (
+                "angle_step=1e99",
+                "angle_step is 1e+99, accepted is 1 to 16",
+            ),
+            (
+                "transport=magic",
+                "transport is \"magic\", accepted is exact, sinkhorn or greedy",
+            ),
+            (
+                "precision=3",
+                "precision is 3, accepted is f32, f16 or 8bit",
+            ),
+            ("transport=sinkhorn,epsilon=inf", "1e-6 to 10"),
+            ("transport=sinkhorn,epsilon=1e99", "epsilon is 1e99"),
             ("best", "reference"),
             ("epsilon=0.1", "sinkhorn"),
             ("transport=sinkhorn,epsilon=0", "1e-6"),

@@ -27,7 +27,7 @@ pub(super) fn common_grid<'a>(
             |(uh, ud)| (uh.union(h), ud.union(d)),
         ))
     });
-    let accepted = Limits::default().angles * super::PAINTS.end();
+    let accepted = Limits::default().common_angles();
     match union.as_ref().map(|(h, d)| h.len().max(d.len())) {
         Some(angles) if angles > accepted => Err(BlendError::Angles { angles, accepted }),
         _ => Ok(union),

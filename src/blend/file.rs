@@ -170,7 +170,6 @@ impl Blend {
         // Corresponding clusters of k paints are at most the sum of theirs, four slices each where grids differ.
         let limits = Limits {
             clusters: limits.clusters * 4 * self.paints.len(),
-            angles: usize::MAX,
             ..*limits
         };
         for (place, paint) in self.paints.iter().enumerate() {

@@ -9,6 +9,7 @@
 //! ```
 
 use super::clamp::Ledger;
+use super::geometric::geometric_mean;
 use crate::paint::{Lobe, MAX_ALPHA, MAX_WEIGHT, MIN_ALPHA};
 
 /// Lobes of several paints, place by place: `matched[place][paint]`.
@@ -90,27 +91,11 @@ fn seats(lobes: &[Lobe], reference: &[f64]) -> Vec<usize> {
 
 /// Blends matched lobes by weights in the paints' order.
 pub(super) fn blend(places: &[Vec<Lobe>], weights: &[f64], ledger: &mut Ledger) -> Vec<Lobe> {
-    let sum: f64 = weights.iter().sum();
-    #[allow(clippy::cast_precision_loss)] // at most five paints
-    let even = 1.0 / weights.len() as f64;
-    let share = |w: f64| if sum.abs() < 1e-9 { even } else { w / sum };
     places
         .iter()
         .map(|lobes| {
             let pairs = || lobes.iter().zip(weights);
-            let alpha = pairs()
-                .map(|(lobe, &w)| lobe.alpha.powf(share(w)))
-                .product::<f64>();
-            // Far extrapolation can give 0 · ∞; the logarithm's sum still knows which of the two it is.
-            let alpha = if alpha.is_nan() {
-                pairs()
-                    .map(|(lobe, &w)| share(w) * lobe.alpha.ln())
-                    .sum::<f64>()
-                    .exp()
-            } else {
-                alpha
-            };
-            let alpha = alpha.min(f64::MAX);
+            let alpha = geometric_mean(lobes.iter().map(|lobe| lobe.alpha), weights);
             Lobe {
                 weight: std::array::from_fn(|c| {
                     let s = pairs().map(|(lobe, w)| w * lobe.weight[c]).sum();

@@ -15,6 +15,7 @@ mod boxes;
 mod clamp;
 mod correspondence;
 mod file;
+mod geometric;
 mod lobes;
 mod mixture;
 mod order;

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::boxes::mix_boxes;
 use super::clamp::{Clamp, Ledger};
+use super::geometric::geometric_mean;
 use super::{Blend, BlendedFlakes, Boxes, RealisationWeights, WeightError, base, lobes};
 use crate::paint::{CarPaint, FlakeTexture, Flakes};
 
@@ -123,12 +124,8 @@ impl BlendedFlakes {
 
     /// Texel, grain and lifetime follow the weights of the lightness: they are how the sparkle looks.
     fn texture(&self, weights: &[f64], ledger: &mut Ledger) -> FlakeTexture {
-        let mix = |get: &dyn Fn(&FlakeTexture) -> f64| -> f64 {
-            self.textures
-                .iter()
-                .zip(weights)
-                .map(|(t, w)| w * get(t))
-                .sum()
+        let mix = |get: &dyn Fn(&FlakeTexture) -> f64| {
+            geometric_mean(self.textures.iter().map(get), weights)
         };
         let mut angle = |field: &'static str, get: &dyn Fn(&FlakeTexture) -> f64| {
             ledger.hold(field, mix(get), 0.01, 1e4)

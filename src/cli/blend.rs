@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::ingest::ReadingArgs;
 use super::output;
-use super::profile::ProfileArgs;
+use super::profile::TargetArgs;
 use super::progress::Progress;
 use crate::accuracy::blend_error;
 use crate::blend::PAINTS;
@@ -23,7 +23,7 @@ pub struct Blend {
     #[arg(value_name = "INPUT", required = true, num_args = 1..)]
     inputs: Vec<String>,
     #[command(flatten)]
-    profile: ProfileArgs,
+    target: TargetArgs,
     /// File to write.
     #[arg(long, value_name = "B.blend")]
     out: PathBuf,
@@ -34,7 +34,8 @@ pub struct Blend {
 
 impl Blend {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        let mut options = ReadingArgs::default().options(None, &self.profile)?;
+        output::check_ending(&self.out, "blend")?;
+        let mut options = ReadingArgs::default().options(None, &self.target.profile)?;
         if !PAINTS.contains(&self.inputs.len()) {
             let problem = format!(
                 "{} paints given, a blend takes {} to {}",
@@ -44,7 +45,7 @@ impl Blend {
             );
             return Err(WorkshopError::usage("INPUT", problem));
         }
-        let picked = self.profile.pick(&Work::BlendNames {
+        let picked = self.target.pick(&Work::BlendNames {
             names: &self.inputs,
             options: &options,
         })?;

@@ -7,9 +7,10 @@ use clap::{Args, Subcommand, ValueEnum};
 use serde_json::json;
 
 use super::ingest::ReadingArgs;
+use super::number::whole;
 use super::output;
 use super::preview::Size;
-use super::profile::ProfileArgs;
+use super::profile::TargetArgs;
 use super::weights::WeightArgs;
 use crate::workshop::{
     Estimate as Estimated, Format, IngestOptions, PictureFormat, PreviewOptions, Stage, Work,
@@ -34,7 +35,7 @@ enum What {
         #[arg(value_name = "INPUT")]
         input: String,
         #[command(flatten)]
-        profile: ProfileArgs,
+        target: TargetArgs,
     },
     /// Of `carpaint blend`, opening and ingesting included.
     Blend {
@@ -42,7 +43,7 @@ enum What {
         #[arg(value_name = "INPUT", required = true, num_args = 1..)]
         inputs: Vec<String>,
         #[command(flatten)]
-        profile: ProfileArgs,
+        target: TargetArgs,
     },
     /// Of `carpaint realise`.
     Realise {
@@ -52,10 +53,16 @@ enum What {
         #[command(flatten)]
         weights: WeightArgs,
         /// What is to be written.
-        #[arg(long, value_enum, value_name = "FORMAT", default_value = "zip")]
+        #[arg(
+            long,
+            value_enum,
+            value_name = "FORMAT",
+            default_value = "zip",
+            allow_hyphen_values = true
+        )]
         format: FormatName,
         #[command(flatten)]
-        profile: ProfileArgs,
+        target: TargetArgs,
     },
     /// Of `carpaint preview`.
     Preview {
@@ -65,16 +72,26 @@ enum What {
         #[command(flatten)]
         weights: WeightArgs,
         /// What the paint is on: sphere, capsule or panel.
-        #[arg(long, value_name = "SHAPE", default_value = "sphere")]
+        #[arg(
+            long,
+            value_name = "SHAPE",
+            default_value = "sphere",
+            allow_hyphen_values = true
+        )]
         scene: String,
         /// Width and height in pixels.
-        #[arg(long, value_name = "WxH", default_value = "512x512")]
+        #[arg(
+            long,
+            value_name = "WxH",
+            default_value = "512x512",
+            allow_hyphen_values = true
+        )]
         size: Size,
         /// Samples per pixel, in place of the profile's.
-        #[arg(long, value_name = "N")]
+        #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true)]
         spp: Option<u32>,
         #[command(flatten)]
-        profile: ProfileArgs,
+        target: TargetArgs,
     },
 }
 
@@ -89,14 +106,14 @@ enum FormatName {
 impl Estimate {
     pub fn run(&self, as_json: bool) -> Result<(), WorkshopError> {
         let begun = Instant::now();
-        let profile = match &self.work {
-            What::Ingest { profile, .. }
-            | What::Blend { profile, .. }
-            | What::Realise { profile, .. }
-            | What::Preview { profile, .. } => profile,
+        let target = match &self.work {
+            What::Ingest { target, .. }
+            | What::Blend { target, .. }
+            | What::Realise { target, .. }
+            | What::Preview { target, .. } => target,
         };
-        let options = ReadingArgs::default().options(None, profile)?;
-        let estimate = self.estimate(profile, &options)?.after(vec![starting()]);
+        let options = ReadingArgs::default().options(None, &target.profile)?;
+        let estimate = self.estimate(target, &options)?.after(vec![starting()]);
         if as_json {
             let mut told = serde_json::to_value(&estimate).map_err(WorkshopError::internal)?;
             told["estimated_in_seconds"] = json!(begun.elapsed().as_secs_f64());
@@ -116,7 +133,7 @@ impl Estimate {
 
     fn estimate(
         &self,
-        args: &ProfileArgs,
+        args: &TargetArgs,
         options: &IngestOptions,
     ) -> Result<Estimated, WorkshopError> {
         let of = |work: &Work<'_>| match args.pick(work)? {

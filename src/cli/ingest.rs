@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::profile::ProfileArgs;
+use super::number::{real, whole};
+use super::profile::{ProfileArgs, TargetArgs};
 use super::progress::Progress;
 use super::{output, show};
 use crate::measurement::{Layout, ReadOptions, ThetaHSpacing};
@@ -21,12 +22,12 @@ pub struct Ingest {
     #[arg(value_name = "INPUT")]
     input: String,
     /// Name of the paint, in place of the measurement's own.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
     name: Option<String>,
     #[command(flatten)]
     reading: ReadingArgs,
     #[command(flatten)]
-    profile: ProfileArgs,
+    target: TargetArgs,
     /// File to write.
     #[arg(long, value_name = "P.paint")]
     out: PathBuf,
@@ -36,16 +37,17 @@ pub struct Ingest {
 #[derive(Args, Clone, Debug, Default)]
 pub struct ReadingArgs {
     /// What the file is, where it should not be recognised from its contents.
-    #[arg(long, value_enum, value_name = "LAYOUT")]
+    #[arg(long, value_enum, value_name = "LAYOUT", allow_hyphen_values = true)]
     layout: Option<LayoutName>,
     /// Spacing of the half angle in an MPI 2005 table.
-    #[arg(long, value_enum, value_name = "SPACING")]
+    #[arg(long, value_enum, value_name = "SPACING", allow_hyphen_values = true)]
     theta_h: Option<SpacingName>,
     /// Bytes before the values of an MPI 2005 table, 84 unless given.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1 << 20))]
+    #[arg(long, value_name = "N", value_parser = whole(0..=1_u64 << 20),
+        allow_hyphen_values = true)]
     header_bytes: Option<u64>,
     /// Give the paint a clear coat of this index of refraction, 1 to 4; otherwise the fit decides.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = real(1.0..=4.0), allow_hyphen_values = true)]
     coat_ior: Option<f64>,
 }
 
@@ -71,12 +73,6 @@ impl ReadingArgs {
         name: Option<String>,
         profile: &ProfileArgs,
     ) -> Result<IngestOptions, WorkshopError> {
-        if let Some(ior) = self.coat_ior.filter(|ior| !(1.0..=4.0).contains(ior)) {
-            return Err(WorkshopError::usage(
-                "--coat-ior",
-                format!("--coat-ior is {ior}, accepted is 1 to 4"),
-            ));
-        }
         let layout = self.layout.map(|layout| match layout {
             LayoutName::Mpi2005 => Layout::Mpi2005,
             LayoutName::Merl => Layout::Merl,
@@ -104,7 +100,10 @@ impl ReadingArgs {
 
 impl Ingest {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        let mut options = self.reading.options(self.name.clone(), &self.profile)?;
+        output::check_ending(&self.out, "paint")?;
+        let mut options = self
+            .reading
+            .options(self.name.clone(), &self.target.profile)?;
         let path = match find(&self.input)? {
             Source::Path(path) => path,
             Source::Sample(sample) => {
@@ -119,7 +118,7 @@ impl Ingest {
             path: &path,
             options: &options,
         };
-        let picked = self.profile.pick(&work)?;
+        let picked = self.target.pick(&work)?;
         if let Some(picked) = &picked {
             options.profile = *picked.profile();
         }

@@ -8,6 +8,7 @@ mod bundle;
 mod estimate;
 mod evaluate;
 mod ingest;
+mod number;
 mod output;
 mod preview;
 mod profile;
@@ -45,7 +46,8 @@ struct Common {
     json: bool,
     #[allow(clippy::doc_markdown)] // a help text, printed as it stands
     /// Threads to compute with, in place of RAYON_NUM_THREADS, in place of all. Results are the same with any number.
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = number::whole(1..=1024_usize),
+        allow_hyphen_values = true)]
     threads: Option<usize>,
 }
 
@@ -93,12 +95,6 @@ pub fn run() -> ExitCode {
 }
 
 fn start(cli: Cli) -> Result<(), WorkshopError> {
-    if cli.common.threads == Some(0) {
-        return Err(WorkshopError::usage(
-            "--threads",
-            "--threads is 0, accepted is 1 or more",
-        ));
-    }
     rayon::ThreadPoolBuilder::new()
         // 0 leaves it to rayon, which reads RAYON_NUM_THREADS, where 0 and nothing mean all.
         .num_threads(cli.common.threads.unwrap_or(0))

@@ -14,8 +14,29 @@ use crate::workshop::WorkshopError;
 /// it leads to is replaced. A replaced file keeps its mode, a new one has what the umask leaves.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), WorkshopError> {
     write(path, bytes).map_err(|error| {
-        WorkshopError::output(path.display(), format!("cannot be written: {error}"))
+        let folder = folder_of(path);
+        let problem = if folder.is_dir() {
+            format!("cannot be written: {error}")
+        } else {
+            format!("cannot be written: there is no folder {}", folder.display())
+        };
+        WorkshopError::output(path.display(), problem)
     })
+}
+
+/// Endings of what this program writes.
+const ENDINGS: [&str; 7] = ["paint", "blend", "zip", "glb", "json", "png", "exr"];
+
+/// Refuses a name that promises another format than the one that will be written.
+pub fn check_ending(path: &Path, own: &str) -> Result<(), WorkshopError> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    match ending {
+        Some(ending) if ending != own && ENDINGS.contains(&&*ending) => {
+            let problem = format!("{} ends in .{ending}, accepted is .{own}", path.display());
+            Err(WorkshopError::usage("--out", problem))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {

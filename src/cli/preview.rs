@@ -8,8 +8,9 @@ use clap::Args;
 use serde_json::json;
 
 use super::ingest::ReadingArgs;
+use super::number::whole;
 use super::output;
-use super::profile::ProfileArgs;
+use super::profile::TargetArgs;
 use super::progress::Progress;
 use super::weights::WeightArgs;
 use crate::workshop::{
@@ -24,20 +25,31 @@ pub struct Preview {
     input: String,
     #[command(flatten)]
     weights: WeightArgs,
-    /// What the paint is on: sphere, capsule or panel.
-    #[arg(long, value_name = "SHAPE", default_value = "sphere")]
+    /// What the paint is on: sphere, capsule or panel, 40 mm across and near enough to tell its flakes.
+    #[arg(
+        long,
+        value_name = "SHAPE",
+        default_value = "sphere",
+        allow_hyphen_values = true
+    )]
     scene: String,
     /// Width and height in pixels.
-    #[arg(long, value_name = "WxH", default_value = "512x512")]
+    #[arg(
+        long,
+        value_name = "WxH",
+        default_value = "512x512",
+        allow_hyphen_values = true
+    )]
     size: Size,
     /// Samples per pixel, in place of the profile's.
-    #[arg(long, value_name = "N", conflicts_with_all = ["max_error", "max_seconds"])]
+    #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true,
+        conflicts_with_all = ["max_error", "max_seconds"])]
     spp: Option<u32>,
     /// A panorama to light it with, .hdr or .exr, in place of the built-in studio.
     #[arg(long, value_name = "FILE")]
     environment: Option<PathBuf>,
     #[command(flatten)]
-    profile: ProfileArgs,
+    target: TargetArgs,
     /// Picture to write: .png for a screen, .exr for linear light.
     #[arg(long, value_name = "F.png|F.exr")]
     out: PathBuf,
@@ -77,7 +89,7 @@ impl FromStr for Size {
 
 impl Preview {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        let options = ReadingArgs::default().options(None, &self.profile)?;
+        let options = ReadingArgs::default().options(None, &self.target.profile)?;
         let format = PictureFormat::of_path(&self.out)?;
         let start = Instant::now();
         let progress = Progress::reading(&self.input);
@@ -96,7 +108,7 @@ impl Preview {
             environment,
             lights: None,
         };
-        let picked = self.profile.pick(&Work::Preview {
+        let picked = self.target.pick(&Work::Preview {
             thing: &thing,
             weights: weights.as_ref(),
             options: &wanted,

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 
+use super::number::{above_zero, whole};
 use crate::accuracy::{Knobs, Profile, ProfileError};
 use crate::paint::Limits;
 use crate::workshop::{Picked, Target, Work, WorkshopError, read};
@@ -12,21 +13,35 @@ use crate::workshop::{Picked, Target, Work, WorkshopError, read};
 #[derive(Args, Clone, Debug, Default)]
 pub struct ProfileArgs {
     /// Accuracy profile: draft, standard, reference, or a JSON file of knobs.
-    #[arg(long, value_name = "NAME|FILE.json", default_value = "standard")]
+    #[arg(
+        long,
+        value_name = "NAME|FILE.json",
+        default_value = "standard",
+        allow_hyphen_values = true
+    )]
     pub profile: String,
     #[allow(clippy::doc_markdown)] // a help text, printed as it stands
     /// Turn one knob of the profile, such as clusters=100; may be repeated. Knobs: clusters, box_rule, angle_step,
     /// transport, epsilon, cost, order, precision, draw, samples_per_pixel.
-    #[arg(long = "knob", value_name = "NAME=VALUE")]
+    #[arg(long = "knob", value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub knobs: Vec<Knobs>,
     /// Clusters per flake slice, 1 to 4096, in place of the profile's.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true)]
     pub clusters: Option<u32>,
+}
+
+/// The profile, or a target in its place.
+#[derive(Args, Clone, Debug, Default)]
+pub struct TargetArgs {
+    #[command(flatten)]
+    pub profile: ProfileArgs,
     /// In place of a profile: the cheapest whose error is at most this, Lab for flakes, CIEDE2000 for pictures.
-    #[arg(long, value_name = "E", conflicts_with_all = ["profile", "knobs", "clusters"])]
+    #[arg(long, value_name = "E", value_parser = above_zero, allow_hyphen_values = true,
+        conflicts_with_all = ["profile", "knobs", "clusters"])]
     pub max_error: Option<f64>,
     /// In place of a profile: the most accurate that is done in so many seconds on this machine.
-    #[arg(long, value_name = "S", conflicts_with_all = ["profile", "knobs", "clusters"])]
+    #[arg(long, value_name = "S", value_parser = above_zero, allow_hyphen_values = true,
+        conflicts_with_all = ["profile", "knobs", "clusters"])]
     pub max_seconds: Option<f64>,
 }
 
@@ -54,15 +69,18 @@ impl ProfileArgs {
 
     /// The profile these arguments mean.
     pub fn profile(&self) -> Result<Profile, WorkshopError> {
-        self.knobs()?.profile().map_err(|e| {
-            let option = match (e.knob(), self.clusters) {
-                (Some("clusters"), Some(_)) => "--clusters",
-                _ => "--profile",
-            };
-            WorkshopError::usage(option, e)
-        })
+        self.knobs()?
+            .profile()
+            .map_err(|e| WorkshopError::usage("--profile", e))
     }
 
+    /// Clusters asked for by number.
+    pub fn asked_clusters(&self) -> Result<Option<usize>, WorkshopError> {
+        Ok(self.knobs()?.clusters.map(|n| n as usize))
+    }
+}
+
+impl TargetArgs {
     /// The profile that meets the target, where one was given.
     pub fn pick(&self, work: &Work<'_>) -> Result<Option<Picked>, WorkshopError> {
         let target = Target {
@@ -80,10 +98,5 @@ impl ProfileArgs {
             return Ok(None);
         }
         target.pick(work).map(Some).map_err(wrong)
-    }
-
-    /// Clusters asked for by number.
-    pub fn asked_clusters(&self) -> Result<Option<usize>, WorkshopError> {
-        Ok(self.knobs()?.clusters.map(|n| n as usize))
     }
 }

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::ingest::ReadingArgs;
 use super::output;
-use super::profile::ProfileArgs;
+use super::profile::TargetArgs;
 use super::progress::Progress;
 use super::weights::WeightArgs;
 use crate::workshop::{Format, Work, WorkshopError, open, realise};
@@ -24,7 +24,7 @@ pub struct Realise {
     #[command(flatten)]
     weights: WeightArgs,
     #[command(flatten)]
-    profile: ProfileArgs,
+    target: TargetArgs,
     /// File to write; its ending says what: .zip, .glb, .json or .paint.
     #[arg(long, value_name = "F.zip|F.glb|F.json|F.paint")]
     out: PathBuf,
@@ -36,13 +36,13 @@ pub struct Realise {
 impl Realise {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
         let start = Instant::now();
-        let mut options = ReadingArgs::default().options(None, &self.profile)?;
+        let mut options = ReadingArgs::default().options(None, &self.target.profile)?;
         let format = Format::of_path(&self.out)?;
         let progress = Progress::reading(&self.input);
         let thing = open(&self.input, &options, &|share| progress.at(share))?;
         drop(progress);
         let weights = self.weights.for_thing(&thing)?;
-        let picked = self.profile.pick(&Work::Realise {
+        let picked = self.target.pick(&Work::Realise {
             thing: &thing,
             weights: weights.as_ref(),
             format,

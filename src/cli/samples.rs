@@ -39,6 +39,7 @@ impl Samples {
         match &self.action {
             Action::List => list(json),
             Action::Export { name, profile, out } => {
+                output::check_ending(out, "paint")?;
                 let bare = name.strip_prefix("sample:").unwrap_or(name);
                 let sample = sample_by_name(bare).ok_or_else(|| {
                     let known: Vec<&str> = SAMPLES.iter().map(|s| s.name).collect();

@@ -19,7 +19,7 @@ use crate::workshop::WorkshopError;
 #[derive(Args, Clone, Debug)]
 pub struct Serve {
     /// Address to listen on.
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8080")]
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8080", allow_hyphen_values = true, value_parser = listen_address)]
     listen: SocketAddr,
     /// Folder for catalogue, uploads and results; created if it is not there.
     #[arg(long, value_name = "DIR", default_value = "carpaint-data")]
@@ -85,6 +85,11 @@ impl Serve {
         }
         Ok(())
     }
+}
+
+fn listen_address(text: &str) -> Result<SocketAddr, String> {
+    let wrong = |_| "accepted is an IP address and a port, such as 127.0.0.1:8080".to_owned();
+    text.parse().map_err(wrong)
 }
 
 /// Loads the samples and says that the service is ready; where that fails the service ends.

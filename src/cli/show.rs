@@ -1,5 +1,7 @@
 //! `carpaint show`: everything known about a paint or a blend.
 
+mod paint_page;
+
 use std::fmt::Write as _;
 
 use clap::Args;
@@ -9,8 +11,9 @@ use super::ingest::ReadingArgs;
 use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
-use crate::paint::PaintFile;
+use crate::paint::{InstrumentError, PaintFile};
 use crate::workshop::{Thing, WorkshopError, describe_blend, describe_paint, open};
+use paint_page::paint_page;
 
 /// Show a paint or a blend: parameters, residuals beside their floor, energy, grain, lifetime, warnings.
 #[derive(Args, Clone, Debug)]
@@ -28,15 +31,16 @@ impl Show {
         let progress = Progress::reading(&self.input);
         let thing = open(&self.input, &options, &|share| progress.at(share))?;
         drop(progress);
-        let about = match thing {
-            Thing::Paint(paint) => describe_paint(&paint),
-            Thing::Blend(blend) => describe_blend(&blend),
+        let text = match (thing, json) {
+            (Thing::Paint(paint), true) => return output::print_json(&describe_paint(&paint)),
+            (Thing::Blend(blend), true) => return output::print_json(&describe_blend(&blend)),
+            (Thing::Paint(paint), false) => paint_page(&paint),
+            (Thing::Blend(blend), false) => {
+                let mut text = String::new();
+                tree(&describe_blend(&blend), 0, &mut text);
+                text
+            }
         };
-        if json {
-            return output::print_json(&about);
-        }
-        let mut text = String::new();
-        tree(&about, 0, &mut text);
         output::print(&text)
     }
 }
@@ -67,6 +71,14 @@ pub fn one_line(paint: &PaintFile) -> String {
             "luminance error {:.1} % (floor {:.1} %)",
             100.0 * r.all.median,
             100.0 * r.all.floor_median
+        ));
+        let worst = |get: &dyn Fn(&InstrumentError) -> f64| {
+            r.instrument.iter().map(get).fold(0.0, f64::max)
+        };
+        parts.push(format!(
+            "color error up to {:.1} ΔE2000 (floor {:.1})",
+            worst(&|at| at.fit),
+            worst(&|at| at.floor)
         ));
     }
     parts.join(" · ")

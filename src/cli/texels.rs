@@ -6,6 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::ingest::ReadingArgs;
+use super::number::{real, whole};
 use super::output;
 use super::preview::Size;
 use super::profile::ProfileArgs;
@@ -22,16 +23,22 @@ pub struct Texels {
     #[command(flatten)]
     weights: WeightArgs,
     /// Angle of the half vector from the normal, degrees inside the coat, 0 to 90.
-    #[arg(long, value_name = "DEG")]
+    #[arg(long, value_name = "DEG", value_parser = real(0.0..=90.0), allow_hyphen_values = true)]
     theta_h: f64,
     /// Angle between half vector and light, degrees inside the coat, 0 to 90.
-    #[arg(long, value_name = "DEG")]
+    #[arg(long, value_name = "DEG", value_parser = real(0.0..=90.0), allow_hyphen_values = true)]
     theta_d: f64,
     /// Width and height in texels.
-    #[arg(long, value_name = "WxH", default_value = "256x256")]
+    #[arg(
+        long,
+        value_name = "WxH",
+        default_value = "256x256",
+        allow_hyphen_values = true
+    )]
     size: Size,
     /// Which random texture.
-    #[arg(long, value_name = "S", default_value_t = 0)]
+    #[arg(long, value_name = "S", default_value_t = 0, value_parser = whole(0..=u32::MAX),
+        allow_hyphen_values = true)]
     seed: u32,
     #[command(flatten)]
     profile: ProfileArgs,
@@ -42,14 +49,7 @@ pub struct Texels {
 
 impl Texels {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        for (name, angle) in [("--theta-h", self.theta_h), ("--theta-d", self.theta_d)] {
-            if !(0.0..=90.0).contains(&angle) {
-                return Err(WorkshopError::usage(
-                    name,
-                    format!("{name} is {angle}, accepted is 0 to 90 degrees"),
-                ));
-            }
-        }
+        output::check_ending(&self.out, "exr")?;
         let options = ReadingArgs::default().options(None, &self.profile)?;
         let progress = Progress::reading(&self.input);
         let thing = open(&self.input, &options, &|share| progress.at(share))?;

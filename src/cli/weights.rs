@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use clap::Args;
 
+use super::number::finite;
 use crate::blend::RealisationWeights;
 use crate::workshop::{Thing, WorkshopError};
 
@@ -18,8 +19,8 @@ impl FromStr for WeightList {
         text.split(',')
             .enumerate()
             .map(|(k, word)| {
-                word.trim().parse::<f64>().map_err(|_| {
-                    format!("number {} is '{word}'; accepted are numbers separated by commas, such as 0.3,0.7", k + 1)
+                finite(word.trim()).map_err(|_| {
+                    format!("number {} is '{word}'; accepted are finite numbers separated by commas, such as 0.3,0.7", k + 1)
                 })
             })
             .collect::<Result<_, _>>()
@@ -30,7 +31,8 @@ impl FromStr for WeightList {
 /// Which realisation of a blend.
 #[derive(Args, Clone, Debug, Default)]
 pub struct WeightArgs {
-    /// One weight per paint, in the order they were blended: 0.5,0.5. May lie outside 0 to 1.
+    /// One weight per paint, in the order they were blended: 0.5,0.5. May lie outside 0 to 1, as -0.2,1.2 beyond the
+    /// second. A mixture's weights sum to 1; others add or take away light, flakes' lightness and refraction.
     #[arg(long, value_name = "W", allow_hyphen_values = true)]
     pub weights: Option<WeightList>,
     /// Weights of coat, diffuse, lobes and color table alone.
@@ -43,7 +45,7 @@ pub struct WeightArgs {
     #[arg(long, value_name = "W", allow_hyphen_values = true)]
     pub flake_color: Option<WeightList>,
     /// Factor on the flakes' a and b: 0 makes them white.
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    #[arg(long, value_name = "S", value_parser = finite, allow_hyphen_values = true)]
     pub flake_saturation: Option<f64>,
 }
 

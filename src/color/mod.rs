@@ -4,15 +4,19 @@
 //! perfect diffuser under that same white. A Lab value that came from elsewhere travels with its illuminant and
 //! observer as a [`ReadingLab`]. Arithmetic is `f64`.
 //!
-//! Left to others: tone mapping and encoding for a screen (`render::film`), spectra (`measurement`).
+//! Left to others: tone mapping for a screen (`render`), spectra (`measurement`).
 
+mod adaptation;
 mod difference;
 mod lab;
 mod rgb;
+mod transfer;
 mod white;
 
+pub use adaptation::adapted;
 pub use difference::ciede2000;
 pub(crate) use lab::{KNEE, expand, expand_f32};
 pub use lab::{Lab, ReadingLab};
 pub use rgb::{LinearRgb, luminance, rgb_to_xyz, xyz_to_rgb};
+pub use transfer::{decode_srgb, encode_srgb, encode_srgb_f32};
 pub use white::{D65_2, Illuminant, Observer, WhitePoint};

@@ -15,7 +15,7 @@ const TO_XYZ: [[f64; 3]; 3] = [
 
 const FROM_XYZ: [[f64; 3]; 3] = inverse(TO_XYZ);
 
-const fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+pub(super) const fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let mut out = [[0.0; 3]; 3];
     let det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
         - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
@@ -33,7 +33,7 @@ const fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     out
 }
 
-const fn times(m: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
+pub(super) const fn times(m: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
     let [x, y, z] = m;
     [
         x[0] * v[0] + x[1] * v[1] + x[2] * v[2],

@@ -10,7 +10,7 @@ use image::ExtendedColorType;
 use super::ExportError;
 use super::gltf_brdf::GltfMaterial;
 use super::png_file::png;
-use crate::color::LinearRgb;
+use crate::color::{LinearRgb, decode_srgb, encode_srgb};
 use crate::paint::{
     Chi, Direction, FlakeSampler, Flakes, RandomTexture, Reflectance, TexelDraw, instrument_pairs,
 };
@@ -210,26 +210,12 @@ struct SrgbCurve {
 
 impl SrgbCurve {
     fn new() -> Self {
-        let encode = |v: f64| {
-            if v <= 0.003_130_8 {
-                12.92 * v
-            } else {
-                1.055 * v.powf(1.0 / 2.4) - 0.055
-            }
-        };
-        let decode = |s: f64| {
-            if s <= 0.040_45 {
-                s / 12.92
-            } else {
-                ((s + 0.055) / 1.055).powf(2.4)
-            }
-        };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within 0..=255
         let bytes = (0..4096_u32)
-            .map(|k| (255.0 * encode((f64::from(k) / 4095.0).powi(2))).round() as u8)
+            .map(|k| (255.0 * encode_srgb((f64::from(k) / 4095.0).powi(2))).round() as u8)
             .collect();
         #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // 0..=255
-        let light = std::array::from_fn(|k| decode(k as f64 / 255.0) as f32);
+        let light = std::array::from_fn(|k| decode_srgb(k as f64 / 255.0) as f32);
         Self { bytes, light }
     }
 

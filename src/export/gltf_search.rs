@@ -3,6 +3,8 @@
 //! For a dozen numbers and a few dozen residuals; derivatives by differences. Deterministic, allocates a few vectors.
 //! Source: D. W. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", J. SIAM 11 (1963).
 
+use crate::descent::damped_step;
+
 /// Residuals of some numbers, each within its bounds.
 pub(super) trait Problem {
     /// Writes the residuals at `x`.
@@ -35,14 +37,16 @@ pub(super) fn minimise(problem: &impl Problem, mut x: Vec<f64>, steps: u32) -> (
             column.clear();
             column.extend(moved.iter().zip(&residuals).map(|(a, b)| (a - b) / NUDGE));
         }
+        let gradient: Vec<f64> = columns.iter().map(|c| dot(c, &residuals)).collect();
         let before = merit;
         for _ in 0..6 {
-            let Some(step) = damped_step(&columns, &residuals, damping) else {
+            let matrix = |r: usize, c: usize| dot(&columns[r], &columns[c]);
+            let Some(step) = damped_step(&gradient, matrix, damping, 1e-9) else {
                 damping *= 10.0;
                 continue;
             };
             for ((t, f), s) in trial.iter_mut().zip(&free).zip(&step) {
-                *t = (f + s.clamp(-3.0, 3.0)).clamp(-FAR, FAR);
+                *t = (f - s.clamp(-3.0, 3.0)).clamp(-FAR, FAR);
             }
             bind(problem, &trial, &mut x);
             problem.residuals(&x, &mut moved);
@@ -70,7 +74,11 @@ const NUDGE: f64 = 1e-5;
 const FAR: f64 = 14.0;
 
 fn squares(residuals: &[f64]) -> f64 {
-    residuals.iter().map(|r| r * r).sum()
+    dot(residuals, residuals)
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// A number within its bounds as a point of the real line.
@@ -83,47 +91,6 @@ fn bind(problem: &impl Problem, free: &[f64], x: &mut [f64]) {
     for ((x, &f), &(low, high)) in x.iter_mut().zip(free).zip(problem.bounds()) {
         *x = low + (high - low) / (1.0 + (-f).exp());
     }
-}
-
-/// Solves `(JᵀJ + λ diag) step = −Jᵀr` by Cholesky's decomposition; `None` when it is not positive.
-fn damped_step(columns: &[Vec<f64>], residuals: &[f64], damping: f64) -> Option<Vec<f64>> {
-    let n = columns.len();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    let mut lower = vec![0.0; n * n];
-    let mut step = vec![0.0; n];
-    for row in 0..n {
-        for column in 0..=row {
-            let mut sum = dot(&columns[row], &columns[column]);
-            if row == column {
-                sum += damping * sum + 1e-9;
-            }
-            for k in 0..column {
-                sum -= lower[row * n + k] * lower[column * n + k];
-            }
-            lower[row * n + column] = if row == column {
-                if !(sum > 0.0 && sum.is_finite()) {
-                    return None;
-                }
-                sum.sqrt()
-            } else {
-                sum / lower[column * n + column]
-            };
-        }
-        step[row] = -dot(&columns[row], residuals);
-    }
-    for row in 0..n {
-        for k in 0..row {
-            step[row] -= lower[row * n + k] * step[k];
-        }
-        step[row] /= lower[row * n + row];
-    }
-    for row in (0..n).rev() {
-        for k in row + 1..n {
-            step[row] -= lower[k * n + row] * step[k];
-        }
-        step[row] /= lower[row * n + row];
-    }
-    Some(step)
 }
 
 #[cfg(test)]

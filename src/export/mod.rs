@@ -2,7 +2,8 @@
 //!
 //! One file per format, each a function from a paint to bytes: [`bundle`] (a `.zip` of textures, shader and
 //! `material.json`), [`material_json`] (the same in one JSON), [`glb`] (a fitted glTF material that carries the
-//! statistical flakes beside it); and [`blend_bundle`], from a whole blend to one `.zip` whose shader mixes the paints
+//! statistical flakes beside it); [`readings`], what an instrument would
+//! say; and [`blend_bundle`], from a whole blend to one `.zip` whose shader mixes the paints
 //! at any weights. The same paint, [`About`] and [`ExportSettings`] give the same bytes on every machine
 //! that rounds alike; neither a clock nor the output's own name gets in.
 //!
@@ -30,6 +31,7 @@ mod made_up;
 mod material_json;
 mod numbers;
 mod png_file;
+mod readings;
 mod rounding;
 mod textures;
 
@@ -44,6 +46,7 @@ pub use inverse_cdf::{InverseCdf, inverse_cdf};
 pub use material_json::material_json;
 #[cfg(test)]
 pub(crate) use numbers::tests::assert_documented;
+pub use readings::{AngleError, Readings, readings};
 pub use rounding::Rounding;
 
 use serde::{Deserialize, Serialize};

@@ -15,14 +15,13 @@ use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 
-use super::directions::{Sample, Stream, TRUSTED_DEG};
+use super::directions::{Sample, TRUSTED_DEG};
 use super::lobes::{DARK, Shape};
 use super::steps::{Steps, Tell};
+use super::stream::Stream;
 use crate::color::{Lab, LinearRgb, ciede2000, luminance};
 use crate::measurement::{MeasuredBrdf, half_frame_pair};
-use crate::paint::{
-    AngleGrid, ColorTable, Direction, fresnel, half_angles, instrument_pairs, refract,
-};
+use crate::paint::{AngleGrid, ColorTable, Direction, half_angles, instrument_pairs, refract};
 
 const THETA_H: [f64; 31] = [
     0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.5, 9.0, 10.5, 12.5, 15.0, 17.5, 20.0, 22.5,
@@ -131,8 +130,8 @@ impl TableProblem<'_> {
         let outermost = OUTERMOST_DEG.to_radians().cos();
         let mut out = Vec::with_capacity(count);
         for k in 0..count {
-            let theta_h = h.0 + stream.next() * (h.1 - h.0);
-            let theta_d = d.0 + stream.next() * (d.1 - d.0);
+            let theta_h = h.0 + stream.unit() * (h.1 - h.0);
+            let theta_d = d.0 + stream.unit() * (d.1 - d.0);
             // Azimuths in even steps: flakes make them the noisiest of the three.
             let phi_d = TAU * k as f64 / count as f64;
             let pair = half_frame_pair(theta_h.to_radians(), theta_d.to_radians(), phi_d);
@@ -378,11 +377,6 @@ pub(super) fn fit_color_table(
     let table = ColorTable::new(grid(rows), grid(columns), labs, lab(&overall))
         .unwrap_or_else(|_| ColorTable::white());
     TableFit { table, mapped }
-}
-
-/// Transmission of the coat for directions inside it.
-pub(super) fn transmission_from_air(wi: Direction, wo: Direction, ior: f64) -> f64 {
-    (1.0 - fresnel(wi[2], ior)) * (1.0 - fresnel(wo[2], ior))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
+use super::stream::Stream;
 use crate::color::{LinearRgb, luminance};
 use crate::measurement::MeasuredBrdf;
 use crate::paint::{Direction, HalfAngles, half_angles};
@@ -15,25 +16,6 @@ pub(super) const TRUSTED_DEG: f64 = 70.0;
 
 /// θh below which a sample counts as next to the mirror direction.
 pub(super) const NEAR_MIRROR_DEG: f64 = 5.0;
-
-/// A fixed stream of numbers in `0..1` (`SplitMix64` by Steele, Lea and Flood 2014); statistics, not secrets.
-#[derive(Clone, Debug)]
-pub(super) struct Stream(u64);
-
-impl Stream {
-    pub const fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    #[allow(clippy::cast_precision_loss)] // 53 bits fit.
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 /// What was measured between two directions.
 #[derive(Clone, Copy, Debug)]
@@ -66,8 +48,8 @@ impl Sample {
 
 /// Uniform direction in a cone around the normal.
 fn in_cone(stream: &mut Stream, degrees: f64) -> Direction {
-    let z = 1.0 - stream.next() * (1.0 - degrees.to_radians().cos());
-    let (s, c) = (TAU * stream.next()).sin_cos();
+    let z = 1.0 - stream.unit() * (1.0 - degrees.to_radians().cos());
+    let (s, c) = (TAU * stream.unit()).sin_cos();
     let r = (1.0 - z * z).max(0.0).sqrt();
     [r * c, r * s, z]
 }
@@ -84,7 +66,7 @@ fn pairs(count: usize, degrees: f64, seed: u64) -> Vec<(Direction, Direction)> {
             break;
         }
         let wi = in_cone(&mut stream, degrees);
-        let wo = if stream.next() < 0.25 {
+        let wo = if stream.unit() < 0.25 {
             let h = in_cone(&mut stream, NEAR_MIRROR_DEG);
             let along = 2.0 * (wi[0] * h[0] + wi[1] * h[1] + wi[2] * h[2]);
             std::array::from_fn(|k| along * h[k] - wi[k])

@@ -3,8 +3,8 @@
 //! Minimises `Σ ρ(r)`, `ρ(r) = 2 c² (√(1 + r²/c²) − 1)`, quadratic below c and linear above, by Levenberg and Marquardt
 //! on reweighted residuals. Bounds are kept by projection: a parameter that stands at a bound and wants out is left out
 //! of the step. Dense normal equations: not for more than some twenty parameters, and not for ill-scaled ones.
-//!
-//! D. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", J. SIAM 11 (1963).
+
+use crate::descent::damped_step;
 
 /// Sums that a residual adds to.
 #[derive(Clone, Debug)]
@@ -96,7 +96,9 @@ pub(super) fn minimise(
                     || (at[k] >= high && sums.gradient[k] < 0.0))
             })
             .collect();
-        let Some(step) = damped_step(&sums, &free, damping) else {
+        let gradient: Vec<f64> = free.iter().map(|&k| sums.gradient[k]).collect();
+        let matrix = |r: usize, c: usize| sums.matrix[free[r] * n + free[c]];
+        let Some(step) = damped_step(&gradient, matrix, damping, 1e-12) else {
             damping *= 10.0;
             if damping > 1e12 {
                 break;
@@ -129,46 +131,6 @@ pub(super) fn minimise(
         cost: sums.cost,
         parameters: at,
     }
-}
-
-/// Solves `(A + μ diag A) d = g` on the free parameters by Cholesky; `None` where it is not positive.
-fn damped_step(sums: &Normal, free: &[usize], damping: f64) -> Option<Vec<f64>> {
-    let n = free.len();
-    let mut l = vec![0.0; n * n];
-    for (r, &row) in free.iter().enumerate() {
-        for (c, &column) in free.iter().enumerate().take(r + 1) {
-            let mut v = sums.matrix[row * sums.count + column];
-            if r == c {
-                v += damping * v + 1e-12;
-            }
-            for k in 0..c {
-                v -= l[r * n + k] * l[c * n + k];
-            }
-            l[r * n + c] = if r == c {
-                positive_root(v)?
-            } else {
-                v / l[c * n + c]
-            };
-        }
-    }
-    let mut d: Vec<f64> = free.iter().map(|&k| sums.gradient[k]).collect();
-    for r in 0..n {
-        for k in 0..r {
-            d[r] -= l[r * n + k] * d[k];
-        }
-        d[r] /= l[r * n + r];
-    }
-    for r in (0..n).rev() {
-        for k in r + 1..n {
-            d[r] -= l[k * n + r] * d[k];
-        }
-        d[r] /= l[r * n + r];
-    }
-    d.iter().all(|v| v.is_finite()).then_some(d)
-}
-
-fn positive_root(v: f64) -> Option<f64> {
-    (v.is_finite() && v > 0.0).then(|| v.sqrt())
 }
 
 #[cfg(test)]

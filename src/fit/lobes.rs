@@ -11,6 +11,9 @@
 //!
 //! One luminance in, one weight per lobe out; color is the table's. Golla and Klein 2018, 3.1.
 
+mod coat_search;
+mod luminance_model;
+
 use std::f64::consts::PI;
 
 use rayon::prelude::*;
@@ -18,7 +21,11 @@ use rayon::prelude::*;
 use super::directions::{NEAR_MIRROR_DEG, Sample};
 use super::least_squares::{Minimum, Normal, Problem, minimise};
 use super::steps::{Steps, Tell};
-use crate::paint::{Direction, fresnel, half_angles, refract};
+use crate::paint::{Coat, Direction, Lobe, half_angles, refract, transmission};
+
+pub(super) use coat_search::CoatSearch;
+use coat_search::{bounds, starts, starts_from};
+use luminance_model::{COAT_IOR, COAT_ROUGHNESS, Geometry, MOST, geometry};
 
 /// Lobes of a fitted paint.
 pub(super) const LOBES: usize = 3;
@@ -32,21 +39,6 @@ const ROBUST: f64 = 0.05;
 const AZIMUTH: f64 = 1.0;
 /// Weight of samples next to the mirror direction.
 const NEAR_WEIGHT: f64 = 0.3;
-
-const COAT_ROUGHNESS: usize = 1 + 3 * LOBES;
-const COAT_IOR: usize = COAT_ROUGHNESS + 1;
-const MOST: usize = COAT_IOR + 1;
-
-/// Which coat a fit looks for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum CoatSearch {
-    /// None: light meets the base.
-    Bare,
-    /// Of this index, roughness to be found.
-    Index(f64),
-    /// Index and roughness to be found.
-    Free,
-}
 
 /// Luminance model: everything of the base but its color.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,82 +55,6 @@ pub(super) struct Shape {
     pub agreeing: usize,
     /// How many starts there were.
     pub starts: usize,
-}
-
-/// A sample's geometry, everything that does not depend on roughness and weight.
-#[derive(Clone, Copy, Debug)]
-struct Geometry {
-    tan2: f64,
-    /// `−4 ln h_z`.
-    spread: f64,
-    schlick: f64,
-    masking: f64,
-    transmission: f64,
-    coat_tan2: f64,
-    /// Coat's highlight without its distribution.
-    coat_rest: f64,
-}
-
-fn geometry(wi: Direction, wo: Direction, ior: Option<f64>) -> Geometry {
-    let outer = half_angles(wi, wo);
-    let spread = |h_z: f64| -4.0 * h_z.ln();
-    let masking = |h: &crate::paint::HalfAngles, i: f64, o: f64| {
-        (1.0 / (i * o)).min(2.0 * h.h_z / (h.h_o * i.max(o)))
-    };
-    let Some(ior) = ior else {
-        return Geometry {
-            tan2: outer.tan2_h,
-            spread: spread(outer.h_z),
-            schlick: (1.0 - outer.h_o).powi(5),
-            masking: masking(&outer, wi[2], wo[2]),
-            transmission: 1.0,
-            coat_tan2: 0.0,
-            coat_rest: 0.0,
-        };
-    };
-    let (i, o) = (refract(wi, ior), refract(wo, ior));
-    let inner = half_angles(i, o);
-    Geometry {
-        tan2: inner.tan2_h,
-        spread: spread(inner.h_z),
-        schlick: (1.0 - inner.h_o).powi(5),
-        masking: masking(&inner, i[2], o[2]),
-        transmission: (1.0 - fresnel(wi[2], ior)) * (1.0 - fresnel(wo[2], ior)),
-        coat_tan2: outer.tan2_h,
-        coat_rest: fresnel(outer.h_o, ior) / 4.0
-            * masking(&outer, wi[2], wo[2])
-            * spread(outer.h_z).exp(),
-    }
-}
-
-impl Geometry {
-    /// Luminance, and its derivatives by the parameters other than the index.
-    fn luminance(&self, p: &[f64], derivatives: Option<&mut [f64; MOST]>) -> f64 {
-        let mut local = [0.0; MOST];
-        let d = derivatives.unwrap_or(&mut local);
-        d[0] = self.transmission * p[0].exp() / PI;
-        let mut sum = d[0];
-        for k in 0..LOBES {
-            let (s, alpha, f0) = (p[1 + 3 * k], p[2 + 3 * k], p[3 + 3 * k].exp());
-            let slope = self.tan2 * (-2.0 * alpha).exp();
-            let rest =
-                (s - slope + self.spread - 2.0 * alpha).exp() * self.masking * self.transmission
-                    / PI;
-            let value = rest * (f0 + (1.0 - f0) * self.schlick);
-            d[1 + 3 * k] = value;
-            d[2 + 3 * k] = value * (2.0 * slope - 2.0);
-            d[3 + 3 * k] = rest * f0 * (1.0 - self.schlick);
-            sum += value;
-        }
-        if p.len() > COAT_ROUGHNESS {
-            let alpha = p[COAT_ROUGHNESS];
-            let slope = self.coat_tan2 * (-2.0 * alpha).exp();
-            let value = (-slope - 2.0 * alpha).exp() / PI * self.coat_rest;
-            d[COAT_ROUGHNESS] = value * (2.0 * slope - 2.0);
-            sum += value;
-        }
-        sum
-    }
 }
 
 struct LobeProblem<'a> {
@@ -222,119 +138,6 @@ impl Problem for LobeProblem<'_> {
             }
         }
     }
-}
-
-fn bounds(search: CoatSearch, unit: f64) -> Vec<(f64, f64)> {
-    let least_f0: f64 = if search == CoatSearch::Bare {
-        0.05
-    } else {
-        0.1
-    };
-    let lift = unit.ln();
-    let mut out = vec![(-14.0 + lift, 2.0 + lift)];
-    for _ in 0..LOBES {
-        out.extend([
-            (-16.0 + lift, 4.0_f64.ln() + lift),
-            (0.004_f64.ln(), 0.0),
-            (least_f0.ln(), 0.0),
-        ]);
-    }
-    if search != CoatSearch::Bare {
-        out.push((0.002_f64.ln(), 0.8_f64.ln()));
-    }
-    if search == CoatSearch::Free {
-        out.push((1.2, 1.8));
-    }
-    out
-}
-
-/// Roughnesses of lobes that a descent starts from.
-const ROUGHNESSES: [[f64; LOBES]; 6] = [
-    [0.04, 0.12, 0.40],
-    [0.015, 0.06, 0.25],
-    [0.08, 0.20, 0.60],
-    [0.03, 0.25, 0.80],
-    [0.10, 0.15, 0.35],
-    [0.006, 0.10, 0.45],
-];
-
-/// Roughness and index of coats that a descent starts from, beside [`ROUGHNESSES`].
-const COATS: [(f64, f64); 6] = [
-    (0.03, 1.5),
-    (0.08, 1.4),
-    (0.3, 1.3),
-    (0.01, 1.5),
-    (0.5, 1.25),
-    (0.15, 1.5),
-];
-
-/// Parameters in the order of [`Geometry::luminance`].
-fn parameters(shape: &Shape, search: CoatSearch) -> Vec<f64> {
-    let mut p = vec![shape.diffuse.ln()];
-    for (s, alpha, f0) in shape.lobes {
-        p.extend([s.ln(), alpha.ln(), f0.ln()]);
-    }
-    let (ior, roughness) = shape.coat.unwrap_or((1.5, 0.03));
-    if search != CoatSearch::Bare {
-        p.push(roughness.ln());
-    }
-    if search == CoatSearch::Free {
-        p.push(ior);
-    }
-    p
-}
-
-/// The bare shape put under coats: its narrowest lobe turned into the coat's highlight, or all of them kept.
-fn starts_from(bare: &Shape, search: CoatSearch) -> Vec<Vec<f64>> {
-    // Inside a coat of index 1.5 half angles shrink by a third, and D grows by the square of that.
-    let under = |l: (f64, f64, f64)| (l.0 / 2.0, l.1 / 1.5, l.2);
-    let [a, b, c] = bare.lobes;
-    let halved = |l: (f64, f64, f64)| (l.0 / 4.0, l.1 / 2.0, l.2);
-    let turned = [under(halved(b)), under(b), under(c)];
-    let kept = [under(a), under(b), under(c)];
-    [(turned, a.1), (kept, 0.03), (kept, 0.3)]
-        .into_iter()
-        .map(|(lobes, roughness)| {
-            parameters(
-                &Shape {
-                    lobes,
-                    coat: Some((1.45, roughness)),
-                    ..bare.clone()
-                },
-                search,
-            )
-        })
-        .collect()
-}
-
-fn starts(search: CoatSearch, samples: &[Target], epsilon: f64) -> Vec<Vec<f64>> {
-    let mut logs: Vec<f64> = samples.iter().map(|s| s.log).collect();
-    logs.sort_by(f64::total_cmp);
-    let at =
-        |share: usize| (logs[(logs.len() - 1) * share / 100].exp() - epsilon).max(epsilon / 10.0);
-    let (dark, bright) = (at(20), at(95));
-    ROUGHNESSES
-        .iter()
-        .zip(COATS)
-        .map(|(alphas, (roughness, ior))| {
-            let mut p = vec![(dark * PI).ln()];
-            for alpha in alphas {
-                let f0: f64 = 0.3;
-                p.extend([
-                    (bright * PI * alpha * alpha / (3.0 * f0)).ln(),
-                    alpha.ln(),
-                    f0.ln(),
-                ]);
-            }
-            if search != CoatSearch::Bare {
-                p.push(f64::ln(roughness));
-            }
-            if search == CoatSearch::Free {
-                p.push(ior);
-            }
-            p
-        })
-        .collect()
 }
 
 /// Brightness of the data against what a reflectance may be: 1 unless it is absurd, and then what to divide by.
@@ -510,98 +313,31 @@ fn cell_of(theta_h: f64, theta_d: f64) -> (u32, u32) {
 impl Shape {
     /// Base luminance under the coat (no transmission), and what of the outside is transmission and highlight.
     pub fn terms(&self, wi: Direction, wo: Direction) -> (f64, f64, f64) {
-        let g = geometry(wi, wo, self.coat.map(|c| c.0));
+        let (i, o, transmission, highlight) = match self.coat {
+            None => (wi, wo, 1.0, 0.0),
+            Some((ior, roughness)) => {
+                let coat = Coat {
+                    roughness,
+                    ..Coat::smooth(ior)
+                };
+                let inner = (refract(wi, ior), refract(wo, ior));
+                let passed = transmission(wi, wo, ior);
+                (inner.0, inner.1, passed, coat.highlight(wi, wo))
+            }
+        };
+        let h = half_angles(i, o);
         let mut base = self.diffuse / PI;
-        for &(s, alpha, f0) in &self.lobes {
-            let a2 = alpha * alpha;
-            let d = (-g.tan2 / a2 + g.spread).exp() / a2;
-            base += s * d * (f0 + (1.0 - f0) * g.schlick) * g.masking / PI;
+        for &(weight, alpha, f0) in &self.lobes {
+            let lobe = Lobe {
+                weight: [weight; 3],
+                alpha,
+                f0,
+            };
+            base += weight * lobe.shape(&h, i[2], o[2]);
         }
-        let highlight = self.coat.map_or(0.0, |(_, alpha)| {
-            let a2 = alpha * alpha;
-            (-g.coat_tan2 / a2).exp() / (PI * a2) * g.coat_rest
-        });
-        (base, g.transmission, highlight)
+        (base, transmission, highlight)
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::directions::measure;
-    use super::*;
-    use crate::color::LinearRgb;
-    use crate::measurement::MeasuredBrdf;
-
-    struct Known(Shape);
-
-    impl MeasuredBrdf for Known {
-        fn reflectance(&self, wi: Direction, wo: Direction) -> Option<LinearRgb> {
-            let (base, transmission, highlight) = self.0.terms(wi, wo);
-            Some([base * transmission + highlight; 3])
-        }
-    }
-
-    fn known(coat: Option<(f64, f64)>) -> Shape {
-        let lobes = [(0.05, 0.06, 0.5), (0.1, 0.2, 0.4), (0.08, 0.5, 0.3)];
-        Shape {
-            diffuse: 0.1,
-            lobes,
-            coat,
-            cost: 0.0,
-            agreeing: 0,
-            starts: 0,
-        }
-    }
-
-    fn worst(a: &Shape, b: &Shape, samples: &[Sample]) -> f64 {
-        let value = |s: &Shape, at: &Sample| {
-            let (base, transmission, highlight) = s.terms(at.wi, at.wo);
-            base * transmission + highlight
-        };
-        samples
-            .iter()
-            .map(|s| (value(a, s) / value(b, s) - 1.0).abs())
-            .fold(0.0, f64::max)
-    }
-
-    #[test]
-    fn a_model_without_noise_is_found_again() {
-        for coat in [None, Some((1.5, 0.03))] {
-            let truth = known(coat);
-            let samples = measure(&Known(truth.clone()), 4000, 70.0, 3);
-            let search = coat.map_or(CoatSearch::Bare, |c| CoatSearch::Index(c.0));
-            let found = fit_shape(&samples, search, 1.0, None, &|_| ()).expect("a fit");
-            // Weights and Fresnel values trade against each other under a coat; what they reflect does not.
-            let worst = worst(&found, &truth, &samples);
-            assert!(worst < 0.02, "{coat:?}: {worst}, {found:?}");
-        }
-    }
-
-    #[test]
-    fn derivatives_are_those_of_the_luminance() {
-        let g = geometry(
-            [0.3, 0.1, 0.9_f64.sqrt()],
-            [-0.1, 0.3, 0.9_f64.sqrt()],
-            Some(1.4),
-        );
-        let p: Vec<f64> = vec![
-            -2.0, -1.0, -1.5, -0.7, -2.0, -0.9, -1.0, -3.0, -0.5, -0.2, -1.0,
-        ];
-        let mut row = [0.0; MOST];
-        g.luminance(&p, Some(&mut row));
-        for k in 0..p.len() {
-            let moved = |d: f64| {
-                let mut q = p.clone();
-                q[k] += d;
-                g.luminance(&q, None)
-            };
-            // Central difference of 1e-5: error 1e-10 relative to the third derivative.
-            let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
-            assert!(
-                (slope - row[k]).abs() < 1e-7 * row[k].abs().max(1e-3),
-                "{k}: {slope} {}",
-                row[k]
-            );
-        }
-    }
-}
+mod tests;

@@ -2,19 +2,21 @@
 
 use std::f64::consts::PI;
 
-use crate::color::{Illuminant, Lab, Observer, ciede2000};
+use crate::color::{D65_2, Lab, Observer, WhitePoint, adapted, ciede2000, rgb_to_xyz};
 use crate::measurement::MultiAngle;
 use crate::paint::{CarPaint, Chi, ReadingError, ReadingResiduals, Reflectance};
 
 /// Compares a paint, flakes at their mean and the coat's mirror image left out, with L, a, b readings.
 ///
-/// `None` where the readings hold no L, a, b, or none whose viewer is above the paint. Readings of another light or
-/// observer than D65 and 2° keep their numbers, which is marked as approximate: to convert them takes spectra.
+/// `None` where the readings hold no L, a, b, or none whose viewer is above the paint. Compared is under the readings'
+/// own light, to which the paint's color is adapted; readings of another observer than the 2° keep their numbers, which
+/// is marked as approximate: to convert them takes spectra. Model description, section 8.
 #[must_use]
 pub fn against_readings(paint: &CarPaint, readings: &MultiAngle) -> Option<ReadingResiduals> {
     let column = |name: &str| readings.columns.iter().position(|own| own == name);
     let [l, a, b] = [column("L")?, column("a")?, column("b")?];
     let reflectance = Reflectance::new(paint);
+    let white = WhitePoint::of(readings.illuminant, Observer::Two);
     let light = readings.illumination_deg.to_radians();
     let wi = [-light.sin(), 0.0, light.cos()];
     let rows: Vec<ReadingError> = readings
@@ -29,9 +31,10 @@ pub fn against_readings(paint: &CarPaint, readings: &MultiAngle) -> Option<Readi
             }
             let read = Lab::from([*row.get(l)?, *row.get(a)?, *row.get(b)?]);
             let factor = reflectance.evaluate(wi, wo, Chi::Table).map(|f| f * PI);
+            let own = Lab::from_xyz(adapted(rgb_to_xyz(factor), D65_2, white), white);
             Some(ReadingError {
                 aspecular_deg,
-                delta_e_2000: ciede2000(Lab::from_rgb(factor), read),
+                delta_e_2000: ciede2000(own, read),
             })
         })
         .collect();
@@ -49,13 +52,14 @@ pub fn against_readings(paint: &CarPaint, readings: &MultiAngle) -> Option<Readi
         rows,
         median,
         worst,
-        approximate: (readings.illuminant, readings.observer) != (Illuminant::D65, Observer::Two),
+        approximate: readings.observer != Observer::Two,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::color::Illuminant;
     use crate::paint::{ASPECULAR_DEG, ColorTable, instrument_pairs};
 
     fn gray(diffuse: f64) -> CarPaint {
@@ -100,6 +104,25 @@ mod tests {
             other.median > 5.0 && other.worst >= other.median,
             "{other:?}"
         );
+    }
+
+    #[test]
+    fn readings_of_another_daylight_are_compared_under_it() {
+        let colored = CarPaint {
+            diffuse: [0.5, 0.2, 0.05],
+            ..gray(0.2)
+        };
+        let mut readings = read_on(&colored);
+        let d50 = WhitePoint::of(Illuminant::D50, Observer::Two);
+        readings.illuminant = Illuminant::D50;
+        let as_they_are = against_readings(&colored, &readings).expect("L, a, b");
+        for row in &mut readings.rows {
+            let xyz = Lab::from([row[2], row[3], row[4]]).to_xyz(D65_2);
+            row[2..].copy_from_slice(&Lab::from_xyz(adapted(xyz, D65_2, d50), d50).to_array());
+        }
+        let own = against_readings(&colored, &readings).expect("L, a, b");
+        assert!(own.worst < 1e-9 && !own.approximate, "{own:?}");
+        assert!(as_they_are.worst > 1.0, "{as_they_are:?}");
     }
 
     #[test]

@@ -13,14 +13,14 @@ use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 
-use super::color_table::{Frame, transmission_from_air};
+use super::color_table::Frame;
 use super::directions::{NEAR_MIRROR_DEG, Sample, measure};
 use super::lobes::DARK;
 use crate::color::{Lab, LinearRgb, ciede2000, luminance};
 use crate::measurement::{MeasuredBrdf, half_frame_pair};
 use crate::paint::{
     ASPECULAR_DEG, Direction, FitResiduals, InstrumentError, LuminanceError, half_angles,
-    instrument_pairs, refract,
+    instrument_pairs, refract, transmission,
 };
 
 const SAMPLES: usize = 48_000;
@@ -183,7 +183,7 @@ impl Judge {
                     Frame::Inside(ior) => (
                         refract(wi, ior),
                         refract(wo, ior),
-                        PI * transmission_from_air(wi, wo, ior),
+                        PI * transmission(wi, wo, ior),
                     ),
                 };
                 let read = Lab::from_rgb(Sample::take(measured, wi, wo)?.rgb.map(|v| v * scale));

@@ -14,6 +14,9 @@ pub(super) const MANIFEST: &str = "paint.json";
 /// Latest version of the format that is read.
 const VERSION: u64 = 1;
 
+/// Unknown keys of one object that are told one by one.
+const UNKNOWN_TOLD: usize = 8;
+
 /// What a manifest says.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Manifest {
@@ -178,14 +181,22 @@ impl<'a> Field<'a> {
         let Value::Object(map) = self.value else {
             return self.refuse(format!("an object with {}", keys.join(", ")));
         };
-        for key in map.keys().filter(|key| !keys.contains(&key.as_str())) {
-            let place = if self.path.is_empty() {
-                String::new()
-            } else {
-                format!(" in {}", self.path)
-            };
+        let place = if self.path.is_empty() {
+            String::new()
+        } else {
+            format!(" in {}", self.path)
+        };
+        let mut unknown = map.keys().filter(|key| !keys.contains(&key.as_str()));
+        for key in unknown.by_ref().take(UNKNOWN_TOLD) {
+            let key: String = key.chars().take(80).collect();
             warnings.push(format!(
-                "{MANIFEST}: \"{key}\"{place} is no key of the format and was not read"
+                "{MANIFEST}: {key:?}{place} is no key of the format and was not read"
+            ));
+        }
+        let more = unknown.count();
+        if more > 0 {
+            warnings.push(format!(
+                "{MANIFEST}: {more} more keys{place} are none of the format and were not read"
             ));
         }
         Ok(())
@@ -314,9 +325,10 @@ impl Manifest {
             _ => return version.refuse("1"),
         }
         root.object(&[&keys[..], &notes[..]].concat(), &mut warnings)?;
-        let name = root.want("name", "a string of 1 to 200 characters")?;
-        if !(1..=200).contains(&name.text()?.chars().count()) {
-            return name.refuse("a string of 1 to 200 characters");
+        let name = root.want("name", "a string of 1 to 200 printable characters")?;
+        let printable = !name.text()?.chars().any(char::is_control);
+        if !(1..=200).contains(&name.text()?.chars().count()) || !printable {
+            return name.refuse("a string of 1 to 200 printable characters");
         }
         let space = root.want("color_space", "\"linear-srgb-d65\"")?;
         if space.text()? != "linear-srgb-d65" {
@@ -483,14 +495,25 @@ fn flakes(
     if u64::from(width) * u64::from(height) > limits.slice_pixels {
         return size.refuse(format!("at most {} pixels", limits.slice_pixels));
     }
+    let theta_h = field
+        .want("theta_h_deg", "a list of angles")?
+        .angles(limits)?;
+    let theta_d = field
+        .want("theta_i_deg", "a list of angles")?
+        .angles(limits)?;
+    let places = (0..theta_h.len()).flat_map(|h| (0..theta_d.len()).map(move |d| (h, d)));
+    let mut names = std::collections::HashSet::new();
+    for name in places.map(|(h, d)| pattern.name(h, d)) {
+        if let Some(twice) = names.replace(name) {
+            return slices.refuse(format!(
+                "a path that names every slice otherwise, which {accepted} does; two would be {twice:?}"
+            ));
+        }
+    }
     Ok(FlakesEntry {
         pattern,
-        theta_h: field
-            .want("theta_h_deg", "a list of angles")?
-            .angles(limits)?,
-        theta_d: field
-            .want("theta_i_deg", "a list of angles")?
-            .angles(limits)?,
+        theta_h,
+        theta_d,
         texel_um: field.want("texel_um", "above 0, to 100000")?.number(
             f64::MIN_POSITIVE,
             1e5,

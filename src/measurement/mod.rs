@@ -101,14 +101,15 @@ pub enum BrdfMeasurement {
 pub enum MeasurementError {
     /// Neither the first bytes nor the length belong to a known layout.
     #[error(
-        "the measurement has {bytes} bytes that begin with {begin:02x?}: that is no tensor file, package, MPI 2005 \
-         table (17496000 bytes and a header of 84) or MERL table (34992012 bytes); name its layout (--layout, or layout in a query), accepted are {LAYOUTS}"
+        "the measurement, {bytes} bytes, {what}; that is no tensor file, package, MPI 2005 table (17496000 bytes and a \
+         header of 84) or MERL table (34992012 bytes); where bytes do not tell, --layout or layout in a query does, \
+         accepted are {LAYOUTS}"
     )]
     Unknown {
         /// Length of the input.
         bytes: usize,
-        /// Its first bytes, at most 8.
-        begin: Vec<u8>,
+        /// What it is instead, as far as its first bytes say.
+        what: String,
     },
     /// More bytes than are accepted.
     #[error("the measurement has {bytes} bytes, accepted are {accepted}")]
@@ -150,8 +151,37 @@ pub fn sniff(bytes: &[u8], options: &ReadOptions) -> Result<Layout, MeasurementE
     } else {
         Err(MeasurementError::Unknown {
             bytes: bytes.len(),
-            begin: bytes.iter().take(8).copied().collect(),
+            what: what_it_is(bytes),
         })
+    }
+}
+
+/// What a file of no known layout is, for who took it for a measurement.
+fn what_it_is(bytes: &[u8]) -> String {
+    let known: [(&[u8], &str); 8] = [
+        (b"\x89PNG", "is a PNG picture"),
+        (b"\xff\xd8\xff", "is a JPEG picture"),
+        (b"\x76\x2f\x31\x01", "is an OpenEXR picture"),
+        (b"#?RADIANCE", "is a Radiance picture"),
+        (b"glTF", "is a glTF model"),
+        (b"\x1f\x8b", "is packed by gzip"),
+        (b"%PDF", "is a PDF"),
+        (
+            b"carpaint",
+            "is a .paint or a .blend, which was fitted already: show, blend, realise or preview it",
+        ),
+    ];
+    let begin = &bytes[..bytes.len().min(8)];
+    match known.iter().find(|(magic, _)| bytes.starts_with(magic)) {
+        Some((_, what)) => (*what).to_owned(),
+        None if bytes.is_empty() => "is empty".to_owned(),
+        None if begin
+            .iter()
+            .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace()) =>
+        {
+            format!("begins with the text {:?}", String::from_utf8_lossy(begin))
+        }
+        None => format!("begins with {begin:02x?}"),
     }
 }
 
@@ -234,11 +264,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_text_file_is_refused_with_its_length_and_first_bytes() {
+    fn what_is_no_measurement_is_refused_with_its_length_and_what_it_is() {
         let error =
             BrdfMeasurement::read(b"hello, paint", &ReadOptions::default(), &Limits::default());
         let text = error.expect_err("no measurement").to_string();
-        assert!(text.contains("12 bytes") && text.contains("68"), "{text}");
+        assert!(
+            text.contains("12 bytes") && text.contains("hello, p"),
+            "{text}"
+        );
+        for (bytes, what) in [
+            (&b"\x89PNG\r\n\x1a\n"[..], "is a PNG picture"),
+            (b"", "is empty"),
+            (b"carpaint", "fitted already"),
+            (b"\x00\x01", "begins with [00, 01]"),
+        ] {
+            let error = sniff(bytes, &ReadOptions::default()).expect_err("no measurement");
+            assert!(error.to_string().contains(what), "{error}");
+        }
     }
 
     #[test]

@@ -90,6 +90,12 @@ pub fn fresnel(cos: f64, ior: f64) -> f64 {
     f64::midpoint(s * s, p * p)
 }
 
+/// Share of light that passes a coat of index `ior` on its way in from `wi` and out towards `wo`, both outside.
+#[must_use]
+pub fn transmission(wi: Direction, wo: Direction, ior: f64) -> f64 {
+    (1.0 - fresnel(wi[2], ior)) * (1.0 - fresnel(wo[2], ior))
+}
+
 /// Direction inside the coat of a direction outside it; exact for an index of 1.
 #[must_use]
 pub fn refract(w: Direction, ior: f64) -> Direction {

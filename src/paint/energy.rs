@@ -44,10 +44,8 @@ pub fn certify(paint: &CarPaint) -> EnergyCertificate {
     }
 }
 
-/// Half vectors of Beckmann density around the normal, one batch a roughness: `dω_o = 4 (h·o) dω_h`.
-///
-/// The finest width present decides the step; the batches are combined by dividing the hemisphere of half vectors at
-/// fixed tangents, so every point is integrated once.
+/// Integral over half vectors, `dω_o = 4 (h·o) dω_h`, in rings of even steps of `t`, `tan θh = α sinh t`: even inside the
+/// narrowest width `α` present, growing outside.
 fn directional_albedo(reflectance: &Reflectance<'_>, theta_deg: f64) -> f64 {
     let paint = reflectance.paint();
     let narrowest = paint

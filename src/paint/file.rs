@@ -60,6 +60,28 @@ pub struct Clustering {
     pub error: Option<ClusteringError>,
 }
 
+impl Clustering {
+    fn check(&self, limits: &Limits) -> Result<(), PaintFileError> {
+        let refuse = |field, value: &dyn std::fmt::Display, accepted| {
+            Err(PaintFileError::Clustering {
+                field,
+                value: value.to_string(),
+                accepted,
+            })
+        };
+        if !(1..=limits.clusters).contains(&self.clusters) {
+            return refuse("clusters", &self.clusters, "1 to the limit");
+        }
+        if !["tight", "moments", "blended"].contains(&self.box_rule.as_str()) {
+            return refuse("box_rule", &self.box_rule, "tight, moments or blended");
+        }
+        if !(1..=90).contains(&self.angle_step) {
+            return refuse("angle_step", &self.angle_step, "1 to 90");
+        }
+        Ok(())
+    }
+}
+
 fn every_angle() -> usize {
     1
 }
@@ -100,6 +122,19 @@ pub enum PaintFileError {
     /// Its name.
     #[error("the name in the .paint file has {0} characters, accepted are 1 to {NAME_CHARACTERS}")]
     Name(usize),
+    /// A name that would not print.
+    #[error("the name in the .paint file is {0:?}, accepted are printable characters")]
+    Unprintable(String),
+    /// What it says of how its flakes were clustered.
+    #[error("clustering.{field} in the .paint file is {value}, accepted is {accepted}")]
+    Clustering {
+        /// The field.
+        field: &'static str,
+        /// What stands there.
+        value: String,
+        /// What may stand there.
+        accepted: &'static str,
+    },
     /// The parameters in it.
     #[error("the .paint file holds no valid paint: {0}")]
     Paint(#[from] PaintError),
@@ -251,6 +286,12 @@ impl PaintFile {
         let length = header.name.chars().count();
         if !(1..=NAME_CHARACTERS).contains(&length) {
             return Err(PaintFileError::Name(length));
+        }
+        if header.name.chars().any(char::is_control) {
+            return Err(PaintFileError::Unprintable(header.name));
+        }
+        if let Some(clustering) = &header.clustering {
+            clustering.check(limits)?;
         }
         let (coat, diffuse, lobes) = (physical.coat, physical.diffuse, physical.lobes);
         let paint = CarPaint {

@@ -1,6 +1,8 @@
 //! Limits on everything untrusted, handed to every parser and renderer.
 
 /// How much of anything is accepted. The default suits a service that strangers upload to.
+///
+/// Of everything but time: what computes has no clock, it is called off from outside, by who waits for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Bytes of an upload, and of what it unpacks to.
@@ -13,7 +15,7 @@ pub struct Limits {
     pub slice_pixels: u64,
     /// Entries of an archive.
     pub entries: usize,
-    /// Angles of one axis of a grid.
+    /// Angles of one axis of a measured grid; a blend of several paints has so many times the union of theirs.
     pub angles: usize,
     /// Lobes of a paint.
     pub lobes: usize,
@@ -25,6 +27,14 @@ pub struct Limits {
     pub samples: u32,
     /// Direction pairs of one evaluation.
     pub pairs: usize,
+}
+
+impl Limits {
+    /// Angles of one axis of a paint that was made of others: a blend's common grid is the union of its paints'.
+    #[must_use]
+    pub const fn common_angles(&self) -> usize {
+        self.angles.saturating_mul(self.paints)
+    }
 }
 
 impl Default for Limits {

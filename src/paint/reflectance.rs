@@ -6,7 +6,7 @@
 use std::f64::consts::PI;
 
 use super::CarPaint;
-use super::coat::{fresnel, refract};
+use super::coat::{self, refract};
 use super::color_table::at_angles;
 use super::direction::{Direction, HalfAngles, half_angles};
 use crate::color::LinearRgb;
@@ -113,7 +113,7 @@ impl<'a> Reflectance<'a> {
         if let Some(coat) = self.paint.coat {
             inner_i = refract(wi, coat.ior);
             inner_o = refract(wo, coat.ior);
-            transmission = (1.0 - fresnel(wi[2], coat.ior)) * (1.0 - fresnel(wo[2], coat.ior));
+            transmission = coat::transmission(wi, wo, coat.ior);
             highlight = coat.highlight(wi, wo);
         }
         let half = half_angles(inner_i, inner_o);

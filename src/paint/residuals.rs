@@ -42,7 +42,7 @@ pub struct ReadingResiduals {
     pub median: f64,
     /// Largest CIEDE2000.
     pub worst: f64,
-    /// Whether the readings were made under another light or observer than D65 and 2°, and compared as they are.
+    /// Whether the readings were made by another observer than the 2°, and compared as they are.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub approximate: bool,
 }

@@ -24,12 +24,13 @@ pub(crate) const fn mix(x: u32) -> u32 {
     (word >> 22) ^ word
 }
 
-/// A number in `0..1` from the upper 24 bits, never 1.
+/// A number strictly between 0 and 1 from the upper 23 bits; with one bit more, the half that is added would be rounded
+/// and the greatest of them be 1.
 #[must_use]
 pub(crate) fn unit(x: u32) -> f32 {
-    #[allow(clippy::cast_precision_loss)] // 24 bits are exact in an f32
-    let top = (x >> 8) as f32;
-    (top + 0.5) / 16_777_216.0
+    #[allow(clippy::cast_precision_loss)] // 23 bits and a half are exact in an f32
+    let top = (x >> 9) as f32;
+    (top + 0.5) / 8_388_608.0
 }
 
 /// The random numbers of one cell at one angle pair.
@@ -262,5 +263,45 @@ impl<'a> FlakeSampler<'a> {
         let [y, u, v]: [f32; 3] =
             std::array::from_fn(|axis| lower[axis] + extent[axis] * draw.place[axis]);
         [expand_f32(y + u), expand_f32(y), expand_f32(y - v)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paint::{AngleGrid, FlakeTexture};
+
+    #[test]
+    fn no_number_is_zero_or_one() {
+        assert!(unit(0) > 0.0 && unit(u32::MAX) < 1.0);
+        // Neighbours differ up to the very end.
+        assert!(unit(u32::MAX) > unit(u32::MAX - (1 << 9)));
+    }
+
+    #[test]
+    fn the_greatest_number_draws_the_last_cluster_of_the_last_slice() {
+        let flakes = Flakes {
+            theta_h: AngleGrid::single(),
+            theta_d: AngleGrid::single(),
+            offsets: vec![0, 2].into(),
+            lower: vec![[10.0; 3], [90.0, 0.0, 0.0]],
+            upper: vec![[10.0; 3], [90.0, 0.0, 0.0]],
+            probability: vec![0.5, 0.5].into(),
+            texture: FlakeTexture {
+                texel_um: 20.0,
+                grain_um: 20.0,
+                lifetime_deg: [5.0; 2],
+                persistence_deg: [90.0; 2],
+            },
+        };
+        let sampler = FlakeSampler::new(&flakes);
+        let last = TexelDraw {
+            pick: unit(u32::MAX),
+            place: [unit(u32::MAX); 3],
+        };
+        // Epoch 0 of both angles turns nothing: the greatest cell has the greatest number.
+        assert_eq!(TexelDraw::of(u32::MAX, 0.0, 0.0, [90.0; 2]).pick, last.pick);
+        let [_, y, _] = sampler.draw(0, last);
+        assert_eq!(y, expand_f32((90.0 + 16.0) / 116.0));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::angle::AngleGridError;
 use super::color_table::ColorTableError;
-use super::{CarPaint, Coat, Flakes, Limits, Lobe};
+use super::{AngleGrid, CarPaint, Coat, Flakes, Limits, Lobe};
 
 /// Least roughness a lobe is evaluated with.
 pub const MIN_ALPHA: f64 = 1e-4;
@@ -75,6 +75,26 @@ fn within(
     })
 }
 
+/// Refuses grids with more angles than any blend has.
+fn angles(
+    part: &str,
+    theta_h: &AngleGrid,
+    theta_d: &AngleGrid,
+    limits: &Limits,
+) -> Result<(), PaintError> {
+    let most = limits.common_angles();
+    for (axis, grid) in [("theta_h", theta_h), ("theta_d", theta_d)] {
+        if grid.len() > most {
+            return Err(PaintError::Count {
+                field: format!("{part}.{axis}"),
+                count: grid.len(),
+                accepted: format!("1 to {most}"),
+            });
+        }
+    }
+    Ok(())
+}
+
 impl CarPaint {
     /// Checks every number and every length.
     ///
@@ -105,7 +125,9 @@ impl CarPaint {
         for (k, lobe) in self.lobes.iter().enumerate() {
             lobe.validate(k)?;
         }
-        for (k, lab) in self.color_table.nodes().iter().enumerate() {
+        let table = &self.color_table;
+        angles("color_table", table.theta_h(), table.theta_d(), limits)?;
+        for (k, lab) in table.nodes().iter().enumerate() {
             for value in lab.to_array() {
                 within(
                     || format!("color_table[{k}]"),
@@ -192,6 +214,7 @@ impl Flakes {
                 ),
             );
         }
+        angles("flakes", &self.theta_h, &self.theta_d, limits)?;
         let clusters = self.offsets.last().map_or(0, |&last| last as usize);
         let lengths = [self.probability.len(), self.lower.len(), self.upper.len()];
         if lengths != [clusters; 3] || self.offsets[0] != 0 {
@@ -291,7 +314,24 @@ impl Flakes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::paint::{AngleGrid, ColorTable, FlakeTexture};
+    use crate::paint::{ColorTable, FlakeTexture};
+
+    #[test]
+    fn more_angles_than_any_blend_has_are_refused() {
+        let limits = Limits::default();
+        let grid = |angles: usize| {
+            let degrees = (0..angles).map(|k| 90.0 * k as f64 / angles as f64);
+            AngleGrid::new(degrees.collect()).expect("ascending")
+        };
+        let most = limits.common_angles();
+        let one = AngleGrid::single();
+        assert_eq!(angles("flakes", &grid(most), &one, &limits), Ok(()));
+        let error = angles("flakes", &one, &grid(most + 1), &limits).expect_err("refused");
+        assert_eq!(
+            error.to_string(),
+            "flakes.theta_d has 906 entries, accepted are 1 to 905"
+        );
+    }
 
     #[test]
     fn offsets_that_do_not_ascend_are_refused_before_a_slice_is_read() {

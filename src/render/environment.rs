@@ -5,12 +5,30 @@
 
 use std::f32::consts::{PI, TAU};
 
+use serde::Serialize;
+
 use super::studio::Studio;
 use super::vector::{Vec3, mix};
 
 /// The surroundings, as radiance by direction.
 #[derive(Clone, Debug)]
-pub struct Environment(Source);
+pub struct Environment {
+    source: Source,
+    pub(super) held: Held,
+}
+
+/// Channels of a picture that were held in the range of light that is drawn, 0 to 65504.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Held {
+    /// Channels above it, which a bare sun reaches.
+    pub too_bright: u64,
+    /// The brightest of them, or 0.
+    pub brightest: f32,
+    /// Channels below 0, which resampling leaves beside bright lights.
+    pub negative: u64,
+    /// The lowest of them, or 0.
+    pub lowest: f32,
+}
 
 #[derive(Clone, Debug)]
 pub(super) enum Source {
@@ -27,6 +45,46 @@ pub(super) struct Map {
     pub(super) pixels: Vec<Vec3>,
 }
 
+impl Held {
+    pub(super) const NONE: Self = Self {
+        too_bright: 0,
+        brightest: 0.0,
+        negative: 0,
+        lowest: 0.0,
+    };
+
+    /// The channel within the range, counted where it was outside.
+    pub(super) fn hold(&mut self, channel: f32, most: f32) -> f32 {
+        if channel > most {
+            self.too_bright += 1;
+            self.brightest = self.brightest.max(channel);
+        } else if channel < 0.0 {
+            self.negative += 1;
+            self.lowest = self.lowest.min(channel);
+        }
+        channel.clamp(0.0, most)
+    }
+
+    /// In words, where there is anything to say.
+    #[must_use]
+    pub fn line(&self) -> Option<String> {
+        let mut parts = Vec::new();
+        if self.too_bright > 0 {
+            parts.push(format!(
+                "{} channels above 65504, up to {}, are drawn as 65504",
+                self.too_bright, self.brightest
+            ));
+        }
+        if self.negative > 0 {
+            parts.push(format!(
+                "{} channels below 0, down to {}, are drawn as 0",
+                self.negative, self.lowest
+            ));
+        }
+        (!parts.is_empty()).then(|| format!("environment: {}", parts.join("; ")))
+    }
+}
+
 impl Default for Environment {
     fn default() -> Self {
         Self::studio()
@@ -37,27 +95,40 @@ impl Environment {
     /// The built-in studio.
     #[must_use]
     pub fn studio() -> Self {
-        Self(Source::Studio(Studio::new()))
+        Self::of(Source::Studio(Studio::new()))
     }
 
     /// The same radiance from everywhere, a white furnace for 1.
     #[must_use]
     pub const fn uniform(radiance: Vec3) -> Self {
-        Self(Source::Uniform(radiance))
+        Self::of(Source::Uniform(radiance))
     }
 
     pub(super) const fn map(map: Map) -> Self {
-        Self(Source::Map(map))
+        Self::of(Source::Map(map))
+    }
+
+    const fn of(source: Source) -> Self {
+        Self {
+            source,
+            held: Held::NONE,
+        }
+    }
+
+    /// What of the picture is not drawn as bright as it was.
+    #[must_use]
+    pub const fn held(&self) -> &Held {
+        &self.held
     }
 
     pub(super) const fn source(&self) -> &Source {
-        &self.0
+        &self.source
     }
 
     /// Radiance from a unit direction that points towards the surroundings.
     #[must_use]
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
-        match &self.0 {
+        match &self.source {
             Source::Studio(studio) => studio.radiance(direction),
             Source::Uniform(radiance) => *radiance,
             Source::Map(map) => map.radiance(direction),

@@ -2,14 +2,14 @@
 //!
 //! Files come from strangers: sizes are checked against [`Limits`] before anything is allocated, a damaged file is an
 //! error that says what is wrong. Negative light counts as none; light above the range of a half is held there, which
-//! only a bare sun reaches.
+//! only a bare sun reaches; both are counted in [`Environment::held`].
 
 use std::io::Cursor;
 
 use exr::prelude::{Compression, ReadChannels, ReadLayers};
 use image::ImageDecoder;
 
-use super::environment::{Environment, Map};
+use super::environment::{Environment, Held, Map};
 use super::vector::Vec3;
 use crate::paint::Limits;
 
@@ -42,12 +42,14 @@ pub enum EnvironmentError {
         accepted: u64,
     },
     /// A pixel that is no light.
-    #[error("pixel ({x}, {y}) is not a number")]
-    NotANumber {
+    #[error("pixel ({x}, {y}) holds {value}, accepted is a finite number")]
+    NotFinite {
         /// Column.
         x: usize,
         /// Row.
         y: usize,
+        /// The channel that is not finite.
+        value: f32,
     },
 }
 
@@ -56,7 +58,7 @@ impl Environment {
     ///
     /// # Errors
     ///
-    /// [`EnvironmentError`] for other formats, damaged files, too many pixels, and pixels that are not numbers.
+    /// [`EnvironmentError`] for other formats, damaged files, too many pixels, and pixels that are not finite.
     pub fn from_bytes(bytes: &[u8], limits: &Limits) -> Result<Self, EnvironmentError> {
         let (width, height, mut pixels) = if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
             read_exr(bytes, limits)?
@@ -65,20 +67,25 @@ impl Environment {
         } else {
             return Err(EnvironmentError::Format);
         };
+        let mut held = Held::NONE;
         for (k, pixel) in pixels.iter_mut().enumerate() {
-            if pixel.iter().any(|v| v.is_nan()) {
-                return Err(EnvironmentError::NotANumber {
+            if let Some(&value) = pixel.iter().find(|v| !v.is_finite()) {
+                return Err(EnvironmentError::NotFinite {
                     x: k % width,
                     y: k / width,
+                    value,
                 });
             }
-            *pixel = pixel.map(|v| v.clamp(0.0, MOST_LIGHT));
+            *pixel = pixel.map(|v| held.hold(v, MOST_LIGHT));
         }
-        Ok(Self::map(Map {
+        let map = Map {
             width,
             height,
             pixels,
-        }))
+        };
+        let mut environment = Self::map(map);
+        environment.held = held;
+        Ok(environment)
     }
 }
 
@@ -225,18 +232,28 @@ mod tests {
     }
 
     #[test]
-    fn pixels_that_are_no_light_are_refused_or_held() {
+    fn pixels_that_are_no_light_are_refused_or_held_and_counted() {
         let limits = Limits::default();
-        let error = Environment::from_bytes(&sky(f32::NAN), &limits).expect_err("NaN");
-        assert!(
-            matches!(error, EnvironmentError::NotANumber { x: 3, y: 1 }),
-            "{error}"
-        );
-        for light in [f32::INFINITY, -1.0, 1e30] {
-            let level = Environment::from_bytes(&sky(light), &limits)
-                .expect("held")
-                .level();
-            assert!(level.is_finite() && level >= 0.0);
+        for light in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let error = Environment::from_bytes(&sky(light), &limits).expect_err("no light");
+            assert!(
+                matches!(error, EnvironmentError::NotFinite { x: 3, y: 1, .. }),
+                "{error}"
+            );
+        }
+        for (light, told) in [
+            (0.5, None),
+            (65504.0, None),
+            (-1.0, Some("1 channels below 0, down to -1, are drawn as 0")),
+            (
+                1e6,
+                Some("1 channels above 65504, up to 1000000, are drawn as 65504"),
+            ),
+        ] {
+            let sky = Environment::from_bytes(&sky(light), &limits).expect("held");
+            let told = told.map(|what| format!("environment: {what}"));
+            assert_eq!(sky.held().line(), told);
+            assert!(sky.level().is_finite() && sky.level() >= 0.0);
         }
     }
 

@@ -11,8 +11,9 @@ use half::f16;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::tone::{encode_srgb, neutral};
+use super::tone::neutral;
 use super::vector::Vec3;
+use crate::color::encode_srgb_f32;
 
 /// A picture in linear sRGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,7 +88,7 @@ impl Film {
         let mut bytes = Vec::with_capacity(self.pixels.len() * 3);
         for (y, row) in (0_u32..).zip(self.pixels.chunks(self.width as usize)) {
             for (x, pixel) in (0_u32..).zip(row) {
-                let shown = neutral(pixel.map(|v| v * self.exposure)).map(encode_srgb);
+                let shown = neutral(pixel.map(|v| v * self.exposure)).map(encode_srgb_f32);
                 let step = dither(x, y);
                 bytes.extend(shown.map(|v| (v * 255.0 + step).clamp(0.0, 255.0) as u8));
             }

@@ -36,14 +36,14 @@ use serde::Serialize;
 
 pub use difference::{PictureDifference, difference};
 pub use effects::{Effect, EffectPlan, PlannedEffect};
-pub use environment::Environment;
+pub use environment::{Environment, Held};
 pub use environment_file::EnvironmentError;
 pub use film::{Film, FilmError};
 pub use noise::SamplingError;
 pub use scene::{Background, Camera, DirectionalLight, Scene};
 pub use surface::Shape;
 pub use texels::texels;
-pub use tone::{encode_srgb, neutral};
+pub use tone::neutral;
 
 use crate::paint::{CarPaint, Limits};
 
@@ -94,13 +94,14 @@ pub struct Rendering {
 ///
 /// # Errors
 ///
-/// [`RenderError::Scene`] for a scene that is out of range.
+/// [`RenderError::Scene`] for a scene that is out of range or beyond the limits.
 pub fn render(
     paint: &CarPaint,
     scene: &Scene,
+    limits: &Limits,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Rendering, RenderError> {
-    scene.validate(&Limits::default())?;
+    scene.validate(limits)?;
     let (shader, plan) = shade::Shader::new(paint, scene);
     let [width, height] = scene.size;
     let done = AtomicU32::new(0);
@@ -128,9 +129,13 @@ pub fn render(
 ///
 /// # Errors
 ///
-/// [`RenderError::Scene`] for a scene that is out of range.
-pub fn sampling(paint: &CarPaint, scene: &Scene) -> Result<SamplingError, RenderError> {
-    scene.validate(&Limits::default())?;
+/// [`RenderError::Scene`] for a scene that is out of range or beyond the limits.
+pub fn sampling(
+    paint: &CarPaint,
+    scene: &Scene,
+    limits: &Limits,
+) -> Result<SamplingError, RenderError> {
+    scene.validate(limits)?;
     let (shader, _) = shade::Shader::new(paint, scene);
     Ok(noise::sampling_error(&shader, scene, None))
 }

@@ -49,7 +49,9 @@ fn scene(size: u32, samples: u32) -> Scene {
 }
 
 fn film(paint: &CarPaint, scene: &Scene) -> Film {
-    render(paint, scene, &|_| {}).expect("a valid scene").film
+    render(paint, scene, &Limits::default(), &|_| {})
+        .expect("a valid scene")
+        .film
 }
 
 /// Mean and relative deviation from a plane-free local mean, of luminance over a block in the middle of a ball.
@@ -185,12 +187,12 @@ fn every_pixel_of_every_shape_is_finite_and_no_light_is_negative() {
 
 #[test]
 fn the_report_says_what_was_left_out() {
-    let report = render(&solid(0.5, None), &scene(8, 1), &|_| {})
+    let report = render(&solid(0.5, None), &scene(8, 1), &Limits::default(), &|_| {})
         .expect("valid")
         .report;
     assert!(!report.plan.has(Effect::Flakes) && !report.plan.has(Effect::Coat));
     assert!(report.plan.has(Effect::Environment));
-    let report = render(&sparkling(), &scene(8, 1), &|_| {})
+    let report = render(&sparkling(), &scene(8, 1), &Limits::default(), &|_| {})
         .expect("valid")
         .report;
     assert!(report.plan.has(Effect::Flakes) && report.plan.has(Effect::MirrorImage));
@@ -198,10 +200,11 @@ fn the_report_says_what_was_left_out() {
 
 #[test]
 fn a_scene_out_of_range_is_refused_by_field() {
-    let refused = |scene: Scene| match render(&solid(0.5, None), &scene, &|_| {}) {
-        Err(RenderError::Scene { field, .. }) => field,
-        other => panic!("{other:?}"),
-    };
+    let refused =
+        |scene: Scene| match render(&solid(0.5, None), &scene, &Limits::default(), &|_| {}) {
+            Err(RenderError::Scene { field, .. }) => field,
+            other => panic!("{other:?}"),
+        };
     assert_eq!(refused(scene(0, 1)), "size");
     assert_eq!(refused(scene(8, 0)), "samples_per_pixel");
     assert_eq!(
@@ -246,7 +249,8 @@ fn no_light_at_all_is_black_not_an_error() {
 #[test]
 fn the_stated_chance_of_a_picture_is_its_distance_from_the_truth() {
     let paint = solid(0.4, Some(Coat::smooth(1.5)));
-    let drawn = |samples| render(&paint, &scene(48, samples), &|_| {}).expect("valid");
+    let drawn =
+        |samples| render(&paint, &scene(48, samples), &Limits::default(), &|_| {}).expect("valid");
     let (some, truth) = (drawn(8), drawn(2048));
     let exposure = scene(48, 8).exposure;
     let errors: Vec<f64> = (some.film.pixels().iter().zip(truth.film.pixels()))
@@ -272,7 +276,7 @@ fn progress_reaches_the_end() {
         let mut highest = highest.lock().expect("unpoisoned");
         *highest = highest.max(share);
     };
-    render(&solid(0.5, None), &scene(8, 1), &tell).expect("valid");
+    render(&solid(0.5, None), &scene(8, 1), &Limits::default(), &tell).expect("valid");
     assert_eq!(*highest.lock().expect("unpoisoned"), 1.0);
 }
 

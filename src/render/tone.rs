@@ -1,4 +1,4 @@
-//! From linear light to a screen: Khronos PBR Neutral, then the sRGB curve.
+//! From linear light to what a screen can show: Khronos PBR Neutral.
 //!
 //! Khronos PBR Neutral (Khronos Group, `ToneMapping` repository, `PBR_Neutral` specification, 2024) keeps base colors under
 //! white light as they are and compresses only what is brighter than 0.8. With `x = min(R, G, B)`, `F90 = 0.04`,
@@ -8,8 +8,6 @@
 //! f = x − x²/(4 F90) for x ≤ 2 F90, else F90;    c ← c − f;    p = max(c)
 //! p ≤ k: done.  Else  n = 1 − (1−k)²/(p + 1 − 2k),  g = 1/(d (p − n) + 1),  c ← (c n/p) g + n (1 − g)
 //! ```
-//!
-//! The sRGB curve is IEC 61966-2-1.
 
 use super::vector::Vec3;
 
@@ -38,16 +36,6 @@ pub fn neutral(color: Vec3) -> Vec3 {
     color.map(|v| v / peak * pressed * keep + pressed * (1.0 - keep))
 }
 
-/// The sRGB curve, 0 to 1.
-#[must_use]
-pub fn encode_srgb(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -70,13 +58,6 @@ mod tests {
         // to lose.
         assert!((neutral([1.0; 3])[0] - 0.869_090_9).abs() < 1e-6);
         assert!(neutral([1e6, 0.0, 0.0]).iter().all(|&v| v <= 1.0));
-    }
-
-    #[test]
-    fn the_screen_curve_has_its_published_ends() {
-        assert_eq!(encode_srgb(0.0), 0.0);
-        assert!((encode_srgb(1.0) - 1.0).abs() < 1e-6);
-        assert!((encode_srgb(0.214_041_14) - 0.5).abs() < 1e-5);
     }
 
     proptest! {

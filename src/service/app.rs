@@ -12,6 +12,7 @@ use serde::Serialize;
 use tokio::sync::{RwLock, watch};
 
 use super::ServiceConfig;
+use super::answer::Keep;
 use super::ids;
 use super::metrics::Metrics;
 use super::problem::{Kind, Problem};
@@ -22,8 +23,8 @@ use super::works::{Thing, Works};
 use crate::blend::Blend;
 use crate::paint::PaintFile;
 use crate::store::{
-    BlendRecord, Blobs, CachedResult, Catalogue, FolderBlobs, Hash, PaintRecord, ResultCache,
-    SqliteCatalogue, StoreError, Visibility,
+    BlendRecord, BlobBytes, Blobs, CachedResult, Catalogue, FolderBlobs, Hash, PaintRecord,
+    ResultCache, SqliteCatalogue, StoreError, Visibility,
 };
 
 /// A running service, shared by its handlers.
@@ -79,6 +80,17 @@ pub struct Shelved {
     pub visibility: Visibility,
     /// Blob of its measurement, where there was one.
     pub measurement: Option<Hash>,
+}
+
+impl Shelved {
+    /// How long files and pictures of it may be kept: what is private, by who asked for it.
+    #[must_use]
+    pub fn keep(&self) -> Keep {
+        match self.visibility {
+            Visibility::Published => Keep::ForEver,
+            Visibility::Private => Keep::Own,
+        }
+    }
 }
 
 /// What else than its paints was asked of a blend, kept with its record.
@@ -352,6 +364,21 @@ impl App {
         };
         self.catalogue.add_paint(&record).await?;
         Ok(())
+    }
+
+    /// A blob that the record of a paint names, to be streamed.
+    ///
+    /// # Errors
+    ///
+    /// [`Kind::UnknownPaint`] when the paint was deleted a moment ago.
+    pub async fn stream_of(&self, id: &str, blob: Hash) -> Result<BlobBytes, Problem> {
+        // An open blob can be read to its end, whatever becomes of its name.
+        let _reading = self.removal.read().await;
+        match self.blobs.stream(blob).await? {
+            Some(bytes) => Ok(bytes),
+            None if self.catalogue.paint(id).await?.is_none() => Err(unknown_paint(id)),
+            None => Err(Problem::internal(format!("a blob of {id} is not there"))),
+        }
     }
 
     /// Forgets a paint and every blob that nothing else names.

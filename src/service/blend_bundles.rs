@@ -4,14 +4,25 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use axum::extract::State;
+use serde::Deserialize;
+use utoipa::IntoParams;
 
 use super::answer::{Answer, Keep};
 use super::app::App;
 use super::extract::{Address, Query};
 use super::ids;
 use super::problem::{Problem, ProblemDocument};
-use super::realisations::ProfileQuery;
+use super::profile::ProfileText;
 use super::works::WorkError;
+
+/// How accurately a bundle is written.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct BundleQuery {
+    /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,precision=f32`.
+    #[param(value_type = Option<String>, example = "standard")]
+    profile: Option<ProfileText>,
+}
 
 /// All paints of a blend in one archive.
 ///
@@ -20,7 +31,7 @@ use super::works::WorkError;
 /// `realisation.zip`.
 #[utoipa::path(
     get, operation_id = "bundle_blend", path = "/v1/blends/{id}/bundle.zip", tag = "blends",
-    params(("id" = String, Path, description = "Blend"), ProfileQuery),
+    params(("id" = String, Path, description = "Blend"), BundleQuery),
     responses(
         (status = 200, description = "The archive", content((Vec<u8> = "application/zip"))),
         (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),
@@ -30,11 +41,13 @@ use super::works::WorkError;
 pub async fn bundle(
     State(app): State<App>,
     Address(id): Address<String>,
-    Query(query): Query<ProfileQuery>,
+    Query(query): Query<BundleQuery>,
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let blend = app.blend(&id).await?;
-    let profile = query.profile.unwrap_or_default().of_query()?;
+    let asked = query.profile.unwrap_or_default();
+    asked.fits(&blend)?;
+    let profile = asked.of_query()?;
     let key = ids::key(
         "blend_bundle",
         &(&blend.id, blend.file.to_string(), profile.export),

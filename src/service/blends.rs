@@ -25,6 +25,7 @@ use super::works::{Asked, Picked, Target, Thing};
 use crate::accuracy::Profile;
 use crate::paint::PaintFile;
 use crate::store::{BlendRecord, JobKind};
+use crate::workshop::check_clusters;
 
 /// Paints to blend.
 #[derive(Debug, Deserialize, ToSchema)]
@@ -89,6 +90,7 @@ pub async fn create(
     let knobs = order.profile.is_some() || order.clusters.is_some();
     let target = targets::of_body(order.max_error, order.max_seconds, knobs)?;
     let asked = order.profile.unwrap_or_default();
+    let turned = asked.0.clusters;
     let mut profile = asked.with_clusters(order.clusters).of_body()?;
     for (place, id) in order.paints.iter().enumerate() {
         if !ids::is("p_", id) || app.catalogue.paint(id).await?.is_none() {
@@ -98,6 +100,9 @@ pub async fn create(
             )
             .accepting("ids that GET /v1/paints lists"));
         }
+    }
+    if let Some(wanted) = order.clusters.or(turned) {
+        clustered_so(&app, &order.paints, wanted, order.clusters.is_some()).await?;
     }
     let whole = (&order.paints, profile, target.max_error, target.max_seconds);
     let claimed = ids::made_of("b_", &whole);
@@ -125,6 +130,33 @@ pub async fn create(
     let made = || async { Ok(app.blend(&id).await?.document.clone()) };
     let answer = prefer.answer(&app, &job, &address, made).await?;
     Ok(targets::told(answer, picked.as_ref()))
+}
+
+/// Refuses paints that were clustered otherwise than asked for: paints are clustered when they are uploaded.
+async fn clustered_so(
+    app: &App,
+    paints: &[String],
+    wanted: u32,
+    alone: bool,
+) -> Result<(), Problem> {
+    let field = if alone {
+        "/clusters"
+    } else {
+        "/profile/clusters"
+    };
+    for id in paints {
+        let shelved = app.paint(id).await?;
+        let Some(paint) = shelved.file_of_paint() else {
+            continue;
+        };
+        if check_clusters(id, paint, wanted as usize).is_err() {
+            let had = paint.clustering.as_ref().map_or(0, |c| c.clusters);
+            let detail = format!("{id} was clustered with {had} clusters a slice, not {wanted}.");
+            let upload = format!("{had}, nothing, or a paint uploaded with clusters={wanted}");
+            return Err(Problem::value(field, detail).accepting(upload));
+        }
+    }
+    Ok(())
 }
 
 /// The profile that meets a target for a blend of these paints.

@@ -10,6 +10,7 @@ use utoipa::ToSchema;
 use super::answer::{Answer, Keep};
 use super::app::{App, Shelved};
 use super::extract::{Json, NoQuery};
+use super::previews::{self, Side};
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::profile::{ProfileDocument, ProfileText};
 use super::targets;
@@ -38,7 +39,7 @@ pub struct EstimateOrder {
     /// What the paint is on, `sphere` unless given.
     scene: Option<Scene>,
     /// Pixels across and down of a picture, 512 each unless given.
-    #[schema(min_items = 2, max_items = 2)]
+    #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
     size: Option<[u32; 2]>,
     /// Accuracy: the name of a preset, or an object of knobs.
     #[schema(value_type = Option<ProfileDocument>)]
@@ -115,6 +116,10 @@ pub async fn create(
 ) -> Result<Answer, Problem> {
     let target = targets::of_body(order.max_error, order.max_seconds, order.profile.is_some())?;
     let profile = order.profile.clone().unwrap_or_default().of_body()?;
+    order.refuse_beside_the_point()?;
+    if let WorkName::Preview = order.work {
+        previews::view(&app, order.view(&profile), &previews::Names::BODY)?;
+    }
     let needed = order.needed(&app).await?;
     let works = Arc::clone(&app.works);
     let estimated = app.bench.run(move || {
@@ -149,10 +154,51 @@ impl EstimateDocument {
 }
 
 impl EstimateOrder {
+    /// A field that the work does not have would be an answer to another question.
+    fn refuse_beside_the_point(&self) -> Result<(), Problem> {
+        let given = [
+            ("paint", self.paint.is_some()),
+            ("blend", self.blend.is_some()),
+            ("paints", self.paints.is_some()),
+            ("weights", self.weights.is_some()),
+            ("format", self.format.is_some()),
+            ("scene", self.scene.is_some()),
+            ("size", self.size.is_some()),
+        ];
+        let (work, taken): (_, &[&str]) = match (self.work, &self.blend) {
+            (WorkName::Ingest, _) => ("ingest", &["paint"]),
+            (WorkName::Blend, _) => ("blend", &["paints"]),
+            (WorkName::Realise, None) => ("realise, of a paint,", &["paint", "format"]),
+            (WorkName::Realise, Some(_)) => ("realise", &["paint", "blend", "weights", "format"]),
+            (WorkName::Preview, None) => ("preview, of a paint,", &["paint", "scene", "size"]),
+            (WorkName::Preview, Some(_)) => {
+                ("preview", &["paint", "blend", "weights", "scene", "size"])
+            }
+        };
+        match given.iter().find(|(name, is)| *is && !taken.contains(name)) {
+            Some((name, _)) => Err(Problem::value(
+                format!("/{name}"),
+                format!("The work {work} takes no {name}."),
+            )
+            .accepting(taken.join(", "))),
+            None => Ok(()),
+        }
+    }
+
+    fn view(&self, profile: &Profile) -> View {
+        View {
+            scene: self.scene.unwrap_or_default(),
+            size: self.size.unwrap_or([512; 2]),
+            samples_per_pixel: profile.samples_per_pixel,
+            lights: None,
+        }
+    }
+
     async fn needed(&self, app: &App) -> Result<Needed, Problem> {
         match self.work {
             WorkName::Ingest => {
-                let id = self.paint.as_deref().ok_or_else(|| missing("paint"))?;
+                let id = self.paint.as_deref();
+                let id = id.ok_or_else(|| missing("paint").accepting("the id of a paint"))?;
                 let paint = of_field(app.paint(id).await, "/paint")?;
                 let none = || {
                     Problem::new(
@@ -166,12 +212,13 @@ impl EstimateOrder {
                 Ok(Needed::Ingest(local.ok_or_else(gone)?))
             }
             WorkName::Blend => {
-                let ids = self.paints.as_deref().ok_or_else(|| missing("paints"))?;
                 let most = app.config.limits.paints;
+                let accepted = format!("2 to {most} ids of paints");
+                let ids = self.paints.as_deref();
+                let ids = ids.ok_or_else(|| missing("paints").accepting(&accepted))?;
                 if !(2..=most).contains(&ids.len()) {
                     let detail = format!("{} paints are to be blended.", ids.len());
-                    return Err(Problem::value("/paints", detail)
-                        .accepting(format!("2 to {most} ids of paints")));
+                    return Err(Problem::value("/paints", detail).accepting(accepted));
                 }
                 let mut paints = Vec::with_capacity(ids.len());
                 for (place, id) in ids.iter().enumerate() {
@@ -182,6 +229,10 @@ impl EstimateOrder {
             }
             WorkName::Realise | WorkName::Preview => match (&self.paint, &self.blend) {
                 (Some(id), None) => {
+                    if self.weights.is_some() {
+                        let problem = Problem::value("/weights", "One paint takes no weights.");
+                        return Err(problem.accepting("nothing"));
+                    }
                     let paint = of_field(app.paint(id).await, "/paint")?;
                     Ok(Needed::Thing(paint, None))
                 }
@@ -237,16 +288,10 @@ impl EstimateOrder {
                         format,
                     });
                 }
-                let view = View {
-                    scene: self.scene.unwrap_or_default(),
-                    size: self.size.unwrap_or([512; 2]),
-                    samples_per_pixel: profile.samples_per_pixel,
-                    lights: None,
-                };
                 then(&Asked::Preview {
                     thing,
                     weights,
-                    view: &view,
+                    view: &self.view(profile),
                     format: PictureFormat::Png,
                 })
             }

@@ -5,15 +5,19 @@ use axum::extract::rejection::BytesRejection;
 use axum::extract::{FromRequest, FromRequestParts, Path, Request};
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, IgnoredAny};
+use utoipa::{IntoParams, PartialSchema};
 
 use super::app::App;
-use super::problem::{Kind, Problem};
-use super::query;
-use crate::workshop::accepted;
+use super::problem::{Kind, Place, Problem};
+use super::{accepted, query};
+use crate::workshop;
 
 /// Most bytes of a JSON body; the router holds bodies to it.
 pub const JSON_BYTES: usize = 64 << 10;
+
+/// Most characters of a refused value that are told.
+const LONGEST_GIVEN: usize = 80;
 
 /// A JSON body. Its type must refuse unknown fields.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +39,7 @@ pub struct NoQuery;
 #[derive(Clone, Copy, Debug)]
 pub struct Address<T>(pub T);
 
-impl<T: DeserializeOwned> FromRequest<App> for Json<T> {
+impl<T: DeserializeOwned + PartialSchema> FromRequest<App> for Json<T> {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &App) -> Result<Self, Problem> {
@@ -78,73 +82,105 @@ fn broken_body(error: &BytesRejection) -> Problem {
     )
 }
 
-fn read_json<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
+fn read_json<T: DeserializeOwned + PartialSchema>(body: &[u8]) -> Result<T, Problem> {
+    let whole = || accepted::in_body::<T>("").unwrap_or_else(|| "an object".to_owned());
+    let malformed = |detail: String| {
+        Problem::new(Kind::MalformedRequest, detail)
+            .at(Place::Body, "")
+            .accepting(format!("JSON: {}", whole()))
+    };
+    if body.iter().all(u8::is_ascii_whitespace) {
+        return Err(malformed("The body is empty.".to_owned()));
+    }
     let mut reader = serde_json::Deserializer::from_slice(body);
     let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         let parent = pointer(error.path());
         let cause = error.into_inner();
-        let pointer = named_field(&cause)
+        let message = cause.to_string();
+        let is_too_large = message.starts_with("number out of range");
+        if !is_too_large && serde_json::from_slice::<IgnoredAny>(body).is_err() {
+            return malformed(format!("The body is not JSON: {cause}."));
+        }
+        let message = message
+            .rsplit_once(" at line ")
+            .map_or(&*message, |(what, _)| what);
+        let pointer = named_field(message)
             .filter(|_| parent.is_empty())
             .map_or(parent, |name| format!("/{name}"));
-        match cause.classify() {
-            serde_json::error::Category::Data => {
-                let problem = Problem::value(pointer, sentence(&cause));
-                match expected(&cause.to_string()) {
-                    Some(accepted) => problem.accepting(accepted),
-                    None => problem,
-                }
-            }
-            _ => Problem::new(
-                Kind::MalformedRequest,
-                format!("The body is not JSON: {cause}."),
-            ),
+        let name = match pointer.trim_start_matches('/') {
+            "" => "The body",
+            name => name,
+        };
+        let documented = || accepted::in_body::<T>(&pointer);
+        let (detail, accepted) = if is_too_large {
+            (format!("{name} is a number out of range."), documented())
+        } else if let Some(accepted) = workshop::accepted(message) {
+            (format!("{message}."), Some(accepted.to_owned()))
+        } else if is_about_names(message) {
+            (sentence(message), expected(message))
+        } else {
+            // Told by its value, not by how a reader calls its type.
+            let detail = format!("{name} is {}.", given(body, &pointer));
+            (detail, documented().or_else(|| expected(message)))
+        };
+        let problem = Problem::value(pointer, detail);
+        match accepted {
+            Some(accepted) => problem.accepting(accepted),
+            None => problem,
         }
     })?;
-    reader.end().map_err(|error| {
-        Problem::new(
-            Kind::MalformedRequest,
-            format!("The body is not JSON: {error}."),
-        )
-    })?;
+    reader
+        .end()
+        .map_err(|error| malformed(format!("The body is not JSON: {error}.")))?;
     Ok(value)
 }
 
-/// What would be accepted, where a reader's message says it: "…, expected one of `a`, `b` at line 1 column 2".
+/// The value at a pointer as it was sent, no more of it than fits in a line.
+fn given(body: &[u8], pointer: &str) -> String {
+    let body: serde_json::Value = serde_json::from_slice(body).unwrap_or_default();
+    let text = body
+        .pointer(pointer)
+        .map_or("missing".to_owned(), ToString::to_string);
+    match text.char_indices().nth(LONGEST_GIVEN) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text,
+    }
+}
+
+/// What would be accepted, where a reader's message says it: "…, expected one of `a`, `b`".
 fn expected(message: &str) -> Option<String> {
     if let Some(field) = message.strip_prefix("missing field `") {
         return field
             .split_once('`')
             .map(|(name, _)| format!("an object with the field {name}"));
     }
-    let message = message
-        .rsplit_once(" at line ")
-        .map_or(message, |(what, _)| what);
-    let Some((_, rest)) = message.rsplit_once(", expected ") else {
-        return accepted(message).map(str::to_owned);
-    };
+    let (_, rest) = message.rsplit_once(", expected ")?;
     let what = rest.strip_prefix("one of ").unwrap_or(rest);
-    Some(match what {
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0".to_owned(),
-        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".to_owned(),
-        "f32" | "f64" => "a number".to_owned(),
-        "a sequence" => "a list".to_owned(),
-        what if what == "a map" || what.starts_with("struct ") => "an object".to_owned(),
-        what => what.replace('`', ""),
-    })
+    Some(what.replace('`', ""))
+}
+
+/// Whether a reader's message is about the name of a field or of a choice.
+fn is_about_names(message: &str) -> bool {
+    [
+        "missing field",
+        "unknown field",
+        "duplicate field",
+        "unknown variant",
+    ]
+    .iter()
+    .any(|words| message.starts_with(words))
 }
 
 /// The field that an object lacks or has twice: the reader names it, but does not point at it.
-fn named_field(cause: &serde_json::Error) -> Option<String> {
-    let text = cause.to_string();
-    let rest = text
+fn named_field(message: &str) -> Option<String> {
+    let rest = message
         .strip_prefix("missing field `")
-        .or_else(|| text.strip_prefix("duplicate field `"))?;
+        .or_else(|| message.strip_prefix("duplicate field `"))?;
     rest.split_once('`').map(|(name, _)| name.to_owned())
 }
 
-fn sentence(cause: &serde_json::Error) -> String {
-    let text = cause.to_string();
-    let mut letters = text.chars();
+fn sentence(message: &str) -> String {
+    let mut letters = message.chars();
     letters.next().map_or(String::new(), |first| {
         format!("{}{}.", first.to_uppercase(), letters.as_str())
     })
@@ -163,25 +199,32 @@ fn pointer(path: &serde_path_to_error::Path) -> String {
         .collect()
 }
 
-impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Query<T> {
+fn read_query<T: DeserializeOwned + IntoParams>(pairs: &[query::Pair]) -> Result<T, Problem> {
+    query::read(pairs, accepted::in_query::<T>)
+}
+
+impl<S: Send + Sync, T: DeserializeOwned + IntoParams> FromRequestParts<S> for Query<T> {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
         let pairs = query::pairs(parts.uri.query().unwrap_or(""))?;
         query::refuse_unknown(&pairs, query::names::<T>())?;
-        query::read(&pairs).map(Self)
+        read_query(&pairs).map(Self)
     }
 }
 
-impl<S: Send + Sync, A: DeserializeOwned, B: DeserializeOwned> FromRequestParts<S>
-    for QueryOfTwo<A, B>
+impl<S, A, B> FromRequestParts<S> for QueryOfTwo<A, B>
+where
+    S: Send + Sync,
+    A: DeserializeOwned + IntoParams,
+    B: DeserializeOwned + IntoParams,
 {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
         let pairs = query::pairs(parts.uri.query().unwrap_or(""))?;
         query::refuse_unknown(&pairs, &[query::names::<A>(), query::names::<B>()].concat())?;
-        Ok(Self(query::read(&pairs)?, query::read(&pairs)?))
+        Ok(Self(read_query(&pairs)?, read_query(&pairs)?))
     }
 }
 
@@ -214,47 +257,84 @@ impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for Address
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::service::Scene;
     use serde::Deserialize;
+    use utoipa::ToSchema;
 
-    #[derive(Debug, Deserialize)]
+    #[derive(Debug, Deserialize, ToSchema)]
     #[serde(deny_unknown_fields)]
     struct Order {
         #[allow(dead_code)] // read by the reader only
+        #[schema(min_items = 2, max_items = 5)]
         paints: Vec<String>,
         #[allow(dead_code)] // read by the reader only
+        #[schema(minimum = 1, maximum = 4096)]
         clusters: Option<u32>,
         #[allow(dead_code)] // read by the reader only
         scene: Option<Scene>,
-    }
-
-    #[derive(Debug, Deserialize)]
-    #[serde(rename_all = "snake_case")]
-    enum Scene {
-        Sphere,
-        Panel,
+        #[allow(dead_code)] // read by the reader only
+        size: Option<[u32; 2]>,
+        #[allow(dead_code)] // read by the reader only
+        #[schema(exclusive_minimum = 0.0)]
+        max_error: Option<f64>,
     }
 
     #[test]
     fn a_json_problem_says_what_would_be_accepted() {
         let cases = [
-            (r#"{"paints": 3}"#, "a list"),
+            (r#"{"paints": 3}"#, "paints is 3.", "a list of 2 to 5"),
+            (r#"{"paints": ["", 7]}"#, "paints/1 is 7.", "text"),
             (
-                r#"{"paints": [], "clusters": 5.5}"#,
+                r#"{"paints": [], "clusters": 1e99}"#,
+                "clusters is 1e+99.",
+                "a whole number from 1 to 4096",
+            ),
+            (
+                r#"{"paints": [], "size": [8, -1]}"#,
+                "size/1 is -1.",
                 "a whole number from 0",
             ),
-            (r#"{"paints": [], "scene": "cube"}"#, "sphere or panel"),
+            (
+                r#"{"paints": [], "max_error": 1e999}"#,
+                "max_error is a number out of range.",
+                "a number above 0",
+            ),
+            (
+                r#"{"paints": [], "scene": "cube"}"#,
+                "Unknown variant `cube`, expected one of `sphere`, `capsule`, `panel`.",
+                "sphere, capsule, panel",
+            ),
+            (
+                r#"{"paints": [], "scene": 3}"#,
+                "scene is 3.",
+                "sphere, capsule, panel",
+            ),
             (
                 r#"{"paints": [], "surprise": 1}"#,
-                "paints, clusters, scene",
+                "Unknown field `surprise`, expected one of `paints`, `clusters`, `scene`, `size`, `max_error`.",
+                "paints, clusters, scene, size, max_error",
             ),
-            (r"{}", "an object with the field paints"),
-            (r#""paints""#, "an object"),
+            (
+                r"{}",
+                "Missing field `paints`.",
+                "an object with the field paints",
+            ),
+            (
+                r#""paints""#,
+                "The body is \"paints\".",
+                "an object with paints",
+            ),
+            ("", "The body is empty.", "JSON: an object with paints"),
         ];
-        for (body, accepted) in cases {
+        for (body, detail, accepted) in cases {
             let problem = read_json::<Order>(body.as_bytes())
                 .expect_err(body)
                 .document(None);
-            assert_eq!(problem.accepted.as_deref(), Some(accepted), "{body}");
+            assert_eq!(
+                (problem.detail.as_str(), problem.accepted.as_deref()),
+                (detail, Some(accepted)),
+                "{body}"
+            );
         }
     }
 

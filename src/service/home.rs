@@ -5,8 +5,8 @@ use axum::http::{HeaderName, header};
 use super::answer::{Answer, Keep};
 use crate::studio;
 
-/// Only what this service itself serves, and pictures the page made of its answers.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' blob:; base-uri 'none'";
+/// Only what this service itself serves, pictures the page made of its answers, and its empty icon.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' blob: data:; base-uri 'none'";
 
 /// `/`
 pub async fn page() -> Answer {

@@ -8,6 +8,7 @@
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
 //! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`).
 
+mod accepted;
 mod accuracy;
 mod answer;
 mod app;
@@ -29,6 +30,7 @@ mod previews;
 mod problem;
 mod profile;
 mod query;
+mod readings;
 mod realisations;
 mod runner;
 mod samples;
@@ -48,7 +50,7 @@ pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use works::{
     Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
-    Progress, Scene, Target, ThetaH, Thing, View, WorkError, Works,
+    Progress, Readings, Scene, Target, ThetaH, Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;
 

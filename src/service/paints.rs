@@ -541,10 +541,9 @@ pub async fn file(
     _: NoQuery,
 ) -> Result<Answer, Problem> {
     let paint = app.paint(&id).await?;
-    let missing = || Problem::internal(format!("the file of {id} is not there"));
-    let blob = app.blobs.stream(paint.file).await?.ok_or_else(missing)?;
+    let blob = app.stream_of(&id, paint.file).await?;
     Ok(
-        Answer::blob(Format::Paint.media_type(), paint.file, blob, Keep::ForEver)
+        Answer::blob(Format::Paint.media_type(), paint.file, blob, paint.keep())
             .saved_as(&format!("{id}.paint")),
     )
 }
@@ -571,8 +570,7 @@ pub async fn measurement(
         )
     };
     let upload = paint.measurement.ok_or_else(none)?;
-    let missing = || Problem::internal(format!("the measurement of {id} is not there"));
-    let blob = app.blobs.stream(upload).await?.ok_or_else(missing)?;
+    let blob = app.stream_of(&id, upload).await?;
     Ok(
         Answer::blob("application/octet-stream", upload, blob, Keep::Own)
             .saved_as(&format!("{id}.measurement")),
@@ -584,6 +582,7 @@ pub async fn measurement(
     delete, operation_id = "delete_paint", path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 204, description = "It is gone"),
+        (status = 409, description = "It is a sample", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
         (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
     )
@@ -593,6 +592,13 @@ pub async fn delete(
     Address(id): Address<String>,
     _: NoQuery,
 ) -> Result<StatusCode, Problem> {
+    let record = app.catalogue.paint(&id).await?;
+    if record.is_some_and(|of| of.source == "sample" && of.measurement.is_none()) {
+        let detail = "This paint is a sample: it would be there again at the next start.";
+        return Err(Problem::new(Kind::SamplePaint, detail).accepting(
+            "PATCH with {\"visibility\": \"private\"}, or a service started with --no-samples",
+        ));
+    }
     app.forget_paint(&id).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -610,6 +616,7 @@ pub(super) fn links(record: &PaintRecord) -> Value {
             "preview": format!("{base}/preview.png"),
             "bundle": format!("{base}/realisation.zip"),
             "glb": format!("{base}/realisation.glb"),
+            "readings": format!("{base}/readings"),
         }
     })
 }

@@ -15,7 +15,7 @@ use super::app::{App, Shelved};
 use super::extract::{Address, Json, NoQuery, Query, QueryOfTwo};
 use super::idempotency::Idempotency;
 use super::ids;
-use super::problem::{Kind, Problem, ProblemDocument};
+use super::problem::{Kind, Place, Problem, ProblemDocument};
 use super::profile::{ProfileDocument, ProfileText};
 use super::targets;
 use super::weights::WeightQuery;
@@ -58,6 +58,12 @@ pub struct ViewQuery {
     #[param(exclusive_minimum = 0.0)]
     max_seconds: Option<f64>,
 }
+
+/// Pixels across or down.
+#[derive(ToSchema)]
+#[schema(minimum = 1, maximum = 4096)]
+#[allow(dead_code)] // says what is accepted
+pub struct Side(u32);
 
 /// `WxH` in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,13 +108,13 @@ impl ViewQuery {
                         .accepting("3 numbers, the direction towards the light")
                 })
         });
-        view(
-            app,
-            self.scene.unwrap_or_default(),
+        let asked = View {
+            scene: self.scene.unwrap_or_default(),
             size,
-            self.spp.unwrap_or(profile.samples_per_pixel),
-            light.transpose()?.map(|light| vec![light]),
-        )
+            samples_per_pixel: self.spp.unwrap_or(profile.samples_per_pixel),
+            lights: light.transpose()?.map(|light| vec![light]),
+        };
+        view(app, asked, &Names::QUERY)
     }
 }
 
@@ -121,6 +127,9 @@ impl ViewQuery {
         weights: Option<&RealisationWeights>,
         format: PreviewFormat,
     ) -> Result<(View, Option<Picked>), Problem> {
+        if let Some(asked) = &self.profile {
+            asked.fits(thing)?;
+        }
         let mut view = self.view(app)?;
         let knobs = self.profile.is_some() || self.spp.is_some();
         let target = targets::of_query(self.max_error, self.max_seconds, knobs)?;
@@ -144,57 +153,88 @@ impl ViewQuery {
     }
 }
 
-/// A view, with everything in range. A parameter that is not is named as in a query.
-fn view(
-    app: &App,
-    scene: Scene,
-    size: [u32; 2],
-    spp: u32,
-    lights: Option<Vec<Light>>,
-) -> Result<View, Problem> {
-    let most = app.config.limits.samples;
-    if !(1..=most).contains(&spp) {
-        return Err(
-            Problem::parameter("spp", format!("spp is {spp}.")).accepting(format!("1 to {most}"))
-        );
+/// How a request calls what makes a view.
+pub(super) struct Names {
+    place: Place,
+    samples: &'static str,
+    /// The light of a query, or the list that lights stand in.
+    light: &'static str,
+}
+
+impl Names {
+    const QUERY: Self = Self {
+        place: Place::Query,
+        samples: "spp",
+        light: "light",
+    };
+    pub(super) const BODY: Self = Self {
+        place: Place::Body,
+        samples: "samples_per_pixel",
+        light: "lights",
+    };
+
+    fn refuse(&self, name: &str, detail: String, accepted: String) -> Problem {
+        let problem = match self.place {
+            Place::Body => Problem::value(format!("/{name}"), detail),
+            _ => Problem::parameter(name, detail),
+        };
+        problem.accepting(accepted)
     }
-    let [width, height] = size;
-    if !size.iter().all(|side| (1..=LONGEST_SIDE).contains(side)) {
-        return Err(
-            Problem::parameter("size", format!("The size is {width} x {height}."))
-                .accepting(format!("1 to {LONGEST_SIDE} each")),
-        );
+
+    fn light(&self, place: usize) -> String {
+        match self.place {
+            Place::Body => format!("{}/{place}", self.light),
+            _ => self.light.to_owned(),
+        }
+    }
+}
+
+/// A view, with everything in range.
+pub(super) fn view(app: &App, view: View, names: &Names) -> Result<View, Problem> {
+    let (most, spp) = (app.config.limits.samples, view.samples_per_pixel);
+    let [width, height] = view.size;
+    let size = format!("{width}x{height}");
+    if !(1..=most).contains(&spp) {
+        let detail = format!("{} is {spp}.", names.samples);
+        return Err(names.refuse(names.samples, detail, format!("1 to {most}")));
+    }
+    if !view
+        .size
+        .iter()
+        .all(|side| (1..=LONGEST_SIDE).contains(side))
+    {
+        let accepted = format!("1 to {LONGEST_SIDE} each");
+        return Err(names.refuse("size", format!("size is {size}."), accepted));
     }
     if u64::from(width) * u64::from(height) * u64::from(spp) > MOST_SAMPLES {
-        let detail = format!("{width} x {height} pixels with {spp} samples each are too much.");
-        return Err(Problem::parameter("spp", detail)
-            .accepting(format!("up to {MOST_SAMPLES} samples in all")));
+        let detail = format!("{} is {spp} for each of {size} pixels.", names.samples);
+        let accepted = format!("up to {MOST_SAMPLES} samples in all");
+        return Err(names.refuse(names.samples, detail, accepted));
     }
-    for light in lights.iter().flatten() {
+    let lights = view.lights.as_deref().unwrap_or_default();
+    if lights.len() > MOST_LIGHTS {
+        let detail = format!("{} has {} lights.", names.light, lights.len());
+        return Err(names.refuse(names.light, detail, format!("up to {MOST_LIGHTS} lights")));
+    }
+    for (place, light) in lights.iter().enumerate() {
         let length: f32 = light.towards.iter().map(|v| v * v).sum();
         let bright = light.irradiance.unwrap_or_default();
         let dim = bright.iter().all(|v| (0.0..=65504.0).contains(v));
         if !(length > 0.0 && length.is_finite() && dim) {
-            return Err(
-                Problem::parameter("light", "A light is no light.").accepting(
-                    "a direction of some length, and an irradiance of 0 to 65504 per channel",
-                ),
-            );
+            let name = names.light(place);
+            let towards = light.towards;
+            let detail = match light.irradiance {
+                Some(irradiance) => {
+                    format!("{name} is towards {towards:?} with irradiance {irradiance:?}.")
+                }
+                None => format!("{name} is towards {towards:?}."),
+            };
+            let accepted =
+                "a direction of some length, and an irradiance of 0 to 65504 per channel";
+            return Err(names.refuse(&name, detail, accepted.to_owned()));
         }
     }
-    if lights
-        .as_ref()
-        .is_some_and(|lights| lights.len() > MOST_LIGHTS)
-    {
-        return Err(Problem::parameter("light", "There are too many lights.")
-            .accepting(format!("up to {MOST_LIGHTS}")));
-    }
-    Ok(View {
-        scene,
-        size,
-        samples_per_pixel: spp,
-        lights,
-    })
+    Ok(view)
 }
 
 /// What is sent of a picture.
@@ -306,6 +346,7 @@ pub struct PreviewOrder {
     /// What the paint is on, `sphere` unless given.
     scene: Option<Scene>,
     /// Width and height in pixels, 512 and 512 unless given.
+    #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
     size: Option<[u32; 2]>,
     /// Samples per pixel, in place of the profile's.
     #[schema(minimum = 1, maximum = 4096)]
@@ -339,22 +380,25 @@ pub async fn create(
     Json(order): Json<PreviewOrder>,
 ) -> Result<Answer, Problem> {
     let (thing, weights) = order.thing(&app).await?;
-    let profile = order.profile.clone().unwrap_or_default().of_body()?;
+    let asked = order.profile.clone().unwrap_or_default();
+    asked.fits(&thing).map_err(|problem| problem.in_body())?;
+    let profile = asked.of_body()?;
     let spp = order.samples_per_pixel;
-    let view = view(
-        &app,
-        order.scene.unwrap_or_default(),
-        order.size.unwrap_or([512, 512]),
-        spp.unwrap_or(profile.samples_per_pixel),
-        order.lights,
-    )
-    .map_err(|problem| problem.in_body("spp", "samples_per_pixel"))?;
+    let asked = View {
+        scene: order.scene.unwrap_or_default(),
+        size: order.size.unwrap_or([512, 512]),
+        samples_per_pixel: spp.unwrap_or(profile.samples_per_pixel),
+        lights: order.lights,
+    };
+    let view = view(&app, asked, &Names::BODY)?;
     let format = order.format.unwrap_or(PreviewFormat::Png);
     let key = key(&thing, weights.as_ref(), &view, format.drawn());
-    idempotency.claim(&app, &key.to_string()).await?;
+    idempotency
+        .claim(&app, &format!("{key} {format:?}"))
+        .await?;
     let drawn = draw(&app, thing, weights, format.drawn(), view).await;
     Ok(drawn
-        .map_err(|problem| problem.in_body("", ""))?
+        .map_err(|problem| problem.in_body())?
         .answer(format, None))
 }
 
@@ -396,7 +440,7 @@ impl PreviewOrder {
                 let weights = asked.for_blend(&blend.names);
                 Ok((
                     Arc::clone(&blend),
-                    Some(weights.map_err(|problem| problem.in_body("", ""))?),
+                    Some(weights.map_err(|problem| problem.in_body())?),
                 ))
             }
             _ => Err(
@@ -427,7 +471,7 @@ async fn draw(
     format: PictureFormat,
     view: View,
 ) -> Result<Drawn, Problem> {
-    let begun = Instant::now();
+    let (begun, keep) = (Instant::now(), thing.keep());
     let key = key(&thing, weights.as_ref(), &view, format);
     let _waits = app.watchers.watch(key);
     let kept = loop {
@@ -468,6 +512,7 @@ async fn draw(
         accuracy,
         report,
         picture,
+        keep,
         time: begun.elapsed(),
     })
 }
@@ -510,13 +555,14 @@ struct Drawn {
     accuracy: String,
     report: Bytes,
     picture: CachedResult,
+    keep: Keep,
     time: Duration,
 }
 
 impl Drawn {
     fn answer(self, format: PreviewFormat, picked: Option<&Picked>) -> Answer {
         // What a target picks may change with the machine's load.
-        let keep = picked.map_or(Keep::ForEver, |_| Keep::Revalidated);
+        let keep = picked.map_or(self.keep, |_| Keep::Revalidated);
         let answer = match format {
             PreviewFormat::Json => Answer::bytes("application/json", self.report, keep),
             _ => Answer::result(format.drawn().media_type(), self.picture, keep),

@@ -40,6 +40,8 @@ pub enum Kind {
     MethodNotAllowed,
     /// The body did not come in time.
     RequestTimeout,
+    /// A sample paint, which would be there again at the next start.
+    SamplePaint,
     /// The job has ended, it cannot be cancelled.
     JobEnded,
     /// The job that was waited for was cancelled.
@@ -116,7 +118,7 @@ pub struct ProblemDocument {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::MalformedRequest,
         Self::InvalidParameter,
         Self::UnknownAddress,
@@ -126,6 +128,7 @@ impl Kind {
         Self::NoMeasurement,
         Self::MethodNotAllowed,
         Self::RequestTimeout,
+        Self::SamplePaint,
         Self::JobEnded,
         Self::JobCancelled,
         Self::KeyUsed,
@@ -182,6 +185,11 @@ impl Kind {
                 "request-timeout",
                 "The request did not come in time",
                 StatusCode::REQUEST_TIMEOUT,
+            ),
+            Self::SamplePaint => (
+                "sample-paint",
+                "Sample paints are not deleted",
+                StatusCode::CONFLICT,
             ),
             Self::JobEnded => ("job-ended", "The job has ended", StatusCode::CONFLICT),
             Self::JobCancelled => (
@@ -296,17 +304,12 @@ impl Problem {
         self
     }
 
-    /// The same problem where parameters stand in the body; a field of one name has another there.
+    /// The same problem where parameters stand in the body.
     #[must_use]
-    pub fn in_body(mut self, from: &str, to: &str) -> Self {
+    pub fn in_body(mut self) -> Self {
         if self.kind == Kind::InvalidParameter {
             self.kind = Kind::InvalidValue;
-            let pointer = self.field.map_or(String::new(), |(_, pointer)| pointer);
-            let named = pointer.strip_prefix('/').filter(|name| *name == from);
-            self.field = Some((
-                Place::Body,
-                named.map_or(pointer.clone(), |_| format!("/{to}")),
-            ));
+            self.field = self.field.map(|(_, pointer)| (Place::Body, pointer));
         }
         self
     }

@@ -3,20 +3,23 @@
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
+use super::app::Shelved;
 use super::problem::Problem;
+use super::works::Thing;
 use crate::accuracy::{Knobs, Profile, ProfileError};
+use crate::workshop::check_clusters;
 
 /// What would be accepted in place of a profile that is none.
 const ACCEPTED: &str =
     "draft, standard, reference, or knobs such as clusters=100 or {\"clusters\": 100}";
 
-/// A profile as it was asked for.
+/// A profile as it was asked for, and whether its clusters stood beside it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ProfileText(pub Knobs);
+pub struct ProfileText(pub Knobs, bool);
 
 impl<'de> Deserialize<'de> for ProfileText {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Knobs::of_name_or_object(deserializer).map(Self)
+        Knobs::of_name_or_object(deserializer).map(|knobs| Self(knobs, false))
     }
 }
 
@@ -70,10 +73,11 @@ impl ProfileText {
     /// The same with clusters that stand beside it.
     #[must_use]
     pub fn with_clusters(self, clusters: Option<u32>) -> Self {
-        Self(Knobs {
+        let knobs = Knobs {
             clusters: clusters.or(self.0.clusters),
             ..self.0
-        })
+        };
+        Self(knobs, clusters.is_some())
     }
 
     /// The profile, asked for in a query.
@@ -83,14 +87,36 @@ impl ProfileText {
     /// [`Problem`] that names the parameter and what would be accepted.
     pub fn of_query(&self) -> Result<Profile, Problem> {
         self.0.profile().map_err(|error| {
-            let parameter = match &error {
-                ProfileError::Range {
-                    knob: "clusters", ..
-                } => "clusters",
+            let parameter = match error.knob() {
+                Some("clusters") if self.1 => "clusters",
                 _ => "profile",
             };
             accepting(Problem::parameter(parameter, sentence(&error)), &error)
         })
+    }
+
+    /// Refuses clusters that a paint or a blend does not have: paints are clustered when they are uploaded.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] that names the parameter.
+    pub fn fits(&self, thing: &Shelved) -> Result<(), Problem> {
+        let Some(wanted) = self.0.clusters else {
+            return Ok(());
+        };
+        let (fits, accepted) = match &thing.thing {
+            Thing::Paint(paint) => (
+                check_clusters(&thing.id, paint, wanted as usize).is_ok(),
+                "a profile without clusters, or a paint uploaded with so many",
+            ),
+            Thing::Blend(_) => (
+                false,
+                "a profile without clusters, or a blend of paints uploaded with so many",
+            ),
+        };
+        let detail = format!("{} has the clusters that it has, not {wanted}.", thing.id);
+        let problem = || Problem::parameter("profile", detail).accepting(accepted);
+        fits.then_some(()).ok_or_else(problem)
     }
 
     /// The profile, asked for in a JSON body.
@@ -100,13 +126,10 @@ impl ProfileText {
     /// [`Problem`] that points at the field and says what would be accepted.
     pub fn of_body(&self) -> Result<Profile, Problem> {
         self.0.profile().map_err(|error| {
-            let pointer = match &error {
-                ProfileError::Range {
-                    knob: "clusters", ..
-                } => "/clusters".to_owned(),
-                error => error
-                    .knob()
-                    .map_or("/profile".to_owned(), |knob| format!("/profile/{knob}")),
+            let pointer = match error.knob() {
+                Some("clusters") if self.1 => "/clusters".to_owned(),
+                Some(knob) => format!("/profile/{knob}"),
+                None => "/profile".to_owned(),
             };
             accepting(Problem::value(pointer, sentence(&error)), &error)
         })

@@ -11,6 +11,11 @@ use serde::de::{self, DeserializeOwned, DeserializeSeed, IntoDeserializer, MapAc
 use serde::forward_to_deserialize_any;
 
 use super::problem::{Kind, Problem};
+use crate::workshop::accepted;
+
+/// What is accepted where nothing says more.
+const ANY_NUMBER: &str = "a finite number";
+const ANY_WHOLE: &str = "a whole number in range";
 
 /// A parameter as it stands in the address, decoded.
 pub type Pair = (String, String);
@@ -33,10 +38,12 @@ impl std::error::Error for Refusal {}
 
 impl de::Error for Refusal {
     fn custom<T: Display>(message: T) -> Self {
+        let message = message.to_string();
+        let accepted = accepted(&message).map(str::to_owned);
         Self {
             name: None,
-            message: message.to_string(),
-            accepted: None,
+            message,
+            accepted,
         }
     }
 
@@ -64,6 +71,14 @@ impl Refusal {
             name: Some(self.name.unwrap_or_else(|| name.to_owned())),
             ..self
         }
+    }
+
+    /// With what would be accepted in place of a value of another type.
+    fn documented(mut self, documented: impl FnOnce(&str) -> Option<String>) -> Self {
+        if let (Some(ANY_NUMBER | ANY_WHOLE), Some(name)) = (self.accepted.as_deref(), &self.name) {
+            self.accepted = documented(name).or(self.accepted);
+        }
+        self
     }
 
     fn problem(self) -> Problem {
@@ -135,8 +150,11 @@ pub fn refuse_unknown(pairs: &[Pair], known: &[&str]) -> Result<(), Problem> {
     }))
 }
 
-/// Reads the parameters that `T` has; others are left to others.
-pub fn read<T: DeserializeOwned>(pairs: &[Pair]) -> Result<T, Problem> {
+/// Reads the parameters that `T` has; others are left to others. What a parameter accepts is asked for by its name.
+pub fn read<T: DeserializeOwned>(
+    pairs: &[Pair],
+    documented: impl FnOnce(&str) -> Option<String>,
+) -> Result<T, Problem> {
     let names = names::<T>();
     let own = pairs
         .iter()
@@ -145,7 +163,7 @@ pub fn read<T: DeserializeOwned>(pairs: &[Pair]) -> Result<T, Problem> {
         rest: own,
         value: None,
     }))
-    .map_err(Refusal::problem)
+    .map_err(|refusal| refusal.documented(documented).problem())
 }
 
 /// The parameters of one struct. Whatever a value is refused for carries its name.
@@ -244,7 +262,7 @@ impl Text<'_> {
 macro_rules! whole_numbers {
     ($($method:ident $visit:ident)*) => {$(
         fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-            visitor.$visit(self.number("a whole number in range")?)
+            visitor.$visit(self.number(ANY_WHOLE)?)
         }
     )*};
 }
@@ -262,9 +280,9 @@ impl<'de> de::Deserializer<'de> for Text<'_> {
     }
 
     fn deserialize_f64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        let value: f64 = self.number("a finite number")?;
+        let value: f64 = self.number(ANY_NUMBER)?;
         if !value.is_finite() {
-            return Err(self.refuse("a finite number"));
+            return Err(self.refuse(ANY_NUMBER));
         }
         visitor.visit_f64(value)
     }
@@ -304,7 +322,10 @@ impl<'de> de::Deserializer<'de> for Text<'_> {
         visitor: V,
     ) -> Result<V::Value, Refusal> {
         let variant: StrDeserializer<'_, Refusal> = self.text.into_deserializer();
-        visitor.visit_enum(variant)
+        visitor.visit_enum(variant).map_err(|refusal| Refusal {
+            message: format!("{} is {:?}.", self.name, self.text),
+            ..refusal
+        })
     }
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
@@ -341,7 +362,9 @@ mod tests {
         let read = || {
             let pairs = pairs(query)?;
             refuse_unknown(&pairs, names::<Asked>())?;
-            read(&pairs)
+            read(&pairs, |name| {
+                (name == "spp").then(|| "a whole number from 1 to 64".to_owned())
+            })
         };
         read().map_err(|problem| serde_json::to_value(problem.document(None)).expect("serialises"))
     }
@@ -369,7 +392,7 @@ mod tests {
             ("weights=0.5,nan", "/weights", "a finite number"),
             ("weights=", "/weights", "a finite number"),
             ("scene=cube", "/scene", "sphere, flat-panel"),
-            ("spp=-1", "/spp", "a whole number in range"),
+            ("spp=-1", "/spp", "a whole number from 1 to 64"),
             ("surprise=1", "/surprise", "weights, scene, spp, name"),
             ("spp=1&spp=2", "/spp", "each parameter once"),
         ];

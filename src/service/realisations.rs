@@ -24,13 +24,13 @@ use crate::blend::RealisationWeights;
 pub struct ProfileQuery {
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,precision=f32,draw=alias`.
     #[param(value_type = Option<String>, example = "standard")]
-    pub(super) profile: Option<ProfileText>,
+    profile: Option<ProfileText>,
     /// In place of a profile: the cheapest whose error is at most this, Lab.
     #[param(exclusive_minimum = 0.0)]
-    max_error: Option<f64>,
+    pub(super) max_error: Option<f64>,
     /// In place of a profile: the most accurate that is done in so many seconds here.
     #[param(exclusive_minimum = 0.0)]
-    max_seconds: Option<f64>,
+    pub(super) max_seconds: Option<f64>,
 }
 
 /// A blend at some weights, as a file.
@@ -89,7 +89,9 @@ async fn realise(
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let target = targets::of_query(query.max_error, query.max_seconds, query.profile.is_some())?;
-    let mut profile = query.profile.unwrap_or_default().of_query()?;
+    let asked = query.profile.unwrap_or_default();
+    asked.fits(&thing)?;
+    let mut profile = asked.of_query()?;
     let mut picked = None;
     if target.is_some() {
         let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(&thing), weights.clone());
@@ -117,6 +119,7 @@ async fn realise(
         ),
     );
     let name = format!("{}.{}", thing.id, format.ending());
+    let keep = thing.keep();
     let on = app.clone();
     let compute = move || async move {
         let (works, counter) = (
@@ -133,7 +136,7 @@ async fn realise(
     };
     let result = app.results.get_or_compute(key, compute).await?;
     // What a target picks may change with the machine's load.
-    let keep = picked.as_ref().map_or(Keep::ForEver, |_| Keep::Revalidated);
+    let keep = picked.as_ref().map_or(keep, |_| Keep::Revalidated);
     let answer = Answer::result(format.media_type(), result, keep).saved_as(&name);
     Ok(answer
         .picked(picked.as_ref())

@@ -20,7 +20,7 @@ use super::{blends, ids, paints};
 use crate::store::{JobKind, JobRecord, JobState, NewJob};
 
 /// How often a job is begun before it is given up: each time the process died over it.
-const MOST_ATTEMPTS: u32 = 5;
+const MOST_ATTEMPTS: u32 = 10;
 
 /// Ended jobs that can still be asked for.
 const JOBS_KEPT: u32 = 10_000;

@@ -20,7 +20,7 @@ use super::extract::JSON_BYTES;
 use super::works::Works;
 use super::{
     ServiceConfig, accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations,
-    paints, previews, realisations, runner, visibility,
+    paints, previews, readings, realisations, runner, visibility,
 };
 use crate::store::StoreError;
 
@@ -73,6 +73,8 @@ pub fn router(app: App) -> Router {
             get(realisations::of_paint),
         )
         .route("/v1/paints/{id}/preview.{format}", get(previews::of_paint))
+        .route("/v1/paints/{id}/readings", get(readings::show))
+        .route("/v1/paints/{id}/readings.csv", get(readings::table))
         .route("/v1/blends", axum::routing::post(blends::create))
         .route("/v1/previews", axum::routing::post(previews::create))
         .route("/v1/blends/{id}", get(blends::show))
@@ -110,7 +112,8 @@ pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = (
     let router = router(app.clone());
     let connections = Arc::new(Semaphore::new(app.config.most_connections));
     let graceful = GracefulShutdown::new();
-    let mut builder = Builder::new(TokioExecutor::new());
+    // HTTP/1 from the first byte on: while the version is still to be told, no timer would run.
+    let mut builder = Builder::new(TokioExecutor::new()).http1_only();
     builder
         .http1()
         .timer(TokioTimer::new())

@@ -38,8 +38,10 @@ impl<S: Send + Sync> FromRequestParts<S> for Prefer {
             .get_all(PREFER)
             .iter()
             .filter_map(|value| value.to_str().ok());
+        // Who gives both asks for the job only when the wait is over (RFC 7240, 4.3).
+        let waits = texts.flat_map(|text| text.split([',', ';']));
         Ok(Self {
-            wait: texts.flat_map(|text| text.split([',', ';'])).find_map(wait),
+            wait: waits.filter_map(wait).max(),
         })
     }
 }

@@ -13,7 +13,8 @@ const MOST: f64 = 1e12;
 #[derive(Debug, Default, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub struct WeightQuery {
-    /// One weight per paint, separated by commas. Either this or `alpha`, `beta`, …
+    /// One weight per paint, separated by commas. Either this or `alpha`, `beta`, … A mixture's weights sum to 1; others
+    /// add or take away light, flakes' lightness and refraction.
     #[param(style = Form, explode = false, min_items = 2, max_items = 5)]
     weights: Option<Vec<f64>>,
     /// Weight of the first paint.

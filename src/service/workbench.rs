@@ -54,7 +54,7 @@ impl Workbench {
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Problem> {
-        match self.run_or_call_off(work).await? {
+        match self.at_a_place(work).await? {
             Ok(value) => Ok(value),
             Err(CalledOff) => Err(Problem::internal(
                 "work was called off that nobody can call off",
@@ -62,12 +62,30 @@ impl Workbench {
         }
     }
 
-    /// Computes at the next free place; the work may stop by [`call_off`].
+    /// Computes at the next free place something long; the work may stop by [`call_off`].
+    ///
+    /// It has threads of its own, so that the system shares the processors: on common threads a blend would wait until
+    /// every line of a picture was drawn.
     ///
     /// # Errors
     ///
     /// As [`Workbench::run`].
     pub async fn run_or_call_off<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<Result<T, CalledOff>, Problem> {
+        let threads = rayon::current_num_threads();
+        self.at_a_place(move || {
+            match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+                Ok(own) => own.install(work),
+                // The system has no threads to give.
+                Err(_) => work(),
+            }
+        })
+        .await
+    }
+
+    async fn at_a_place<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<Result<T, CalledOff>, Problem> {

@@ -14,6 +14,7 @@ use crate::paint::PaintFile;
 /// Share done, from 0 to 1. It does not return when the work was called off.
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
+pub use crate::export::Readings;
 pub use crate::workshop::{Estimate, Picked, Target, Thing};
 
 /// What a measurement file is.
@@ -102,9 +103,11 @@ pub enum Scene {
 #[serde(deny_unknown_fields)]
 pub struct Light {
     /// Towards the light, of any length: x to the right, y up, z towards the viewer.
+    #[schema(min_items = 3, max_items = 3)]
     pub towards: [f32; 3],
     /// Irradiance on a surface that faces it, linear sRGB; that of the scene's usual light unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 3, max_items = 3)]
     pub irradiance: Option<[f32; 3]>,
 }
 
@@ -252,6 +255,14 @@ pub trait Works: Debug + Send + Sync {
         format: PictureFormat,
         progress: Progress<'_>,
     ) -> Result<Picture, WorkError>;
+
+    /// A paint is read by a virtual multi-angle instrument, at its own angles where none are given.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for angles that no instrument reads at.
+    fn readings(&self, paint: &Thing, aspecular_deg: Option<&[f64]>)
+    -> Result<Readings, WorkError>;
 
     /// What some work will take with a profile.
     ///

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::works::{
     Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
-    Progress, Scene, Target, ThetaH, Thing, View, WorkError, Works,
+    Progress, Readings, Scene, Target, ThetaH, Thing, View, WorkError, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
@@ -200,6 +200,17 @@ impl Works for Workshop {
             accuracy: accuracy.join(", "),
             report: made.report,
         })
+    }
+
+    fn readings(
+        &self,
+        paint: &Thing,
+        aspecular_deg: Option<&[f64]>,
+    ) -> Result<Readings, WorkError> {
+        match paint {
+            Thing::Paint(paint) => Ok(workshop::readings(paint, aspecular_deg)?),
+            Thing::Blend(_) => Err(WorkshopError::internal("a blend is not read").into()),
+        }
     }
 
     fn estimate(&self, asked: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError> {

@@ -2,7 +2,13 @@
 const corners = [[150, 0], [0, 260], [300, 260]];
 const wanted = ["polaris_silber", "blue", "ford_f8"];
 const at = id => document.getElementById(id);
-const state = { point: [150, 173], ids: [], names: [], blend: null, busy: false, again: null };
+const state = {
+  point: [150, 173], chosen: [],
+  // What the pictures are of: an answered blend and the names of its paints, which belong together.
+  blend: null, names: [], asked: 0,
+  // The picture that is being waited for, and what to draw after it.
+  drawing: null, again: null, rest: 0,
+};
 
 const problemOf = async answer => {
   try { const told = await answer.json(); return told.detail || told.title; } catch { return `${answer.status}`; }
@@ -50,33 +56,36 @@ function told() {
   }));
 }
 
-// One picture at a time: a quick one while the point moves, a fine one where it rests.
+// One picture at a time: a quick one while the point moves, a fine one where it rests. A quick one is waited for, so that
+// pictures keep coming; a fine one is called off by whatever comes after it.
 async function draw(fine) {
   if (!state.blend) return;
-  if (state.busy) { state.again = fine; return; }
-  state.busy = true;
+  clearTimeout(state.rest);
+  if (state.drawing) {
+    state.again = fine;
+    if (state.drawing.fine) state.drawing.abort.abort();
+    return;
+  }
+  const drawing = state.drawing = { fine, abort: new AbortController() };
   told();
   const size = fine ? "560x560&spp=48" : "280x280&spp=8";
   const picture = at("picture");
   picture.classList.add("stale");
   try {
-    const answer = await ask(`/v1/blends/${state.blend}/preview.png?${query()}&scene=${at("scene").value}&size=${size}`);
-    const address = URL.createObjectURL(await answer.blob());
-    picture.onload = () => URL.revokeObjectURL(address);
-    picture.src = address;
+    const address = `/v1/blends/${state.blend}/preview.png?${query()}&scene=${at("scene").value}&size=${size}`;
+    const bytes = await (await ask(address, { signal: drawing.abort.signal })).blob();
+    const shown = URL.createObjectURL(bytes);
+    picture.onload = () => URL.revokeObjectURL(shown);
+    picture.src = shown;
     picture.classList.remove("stale");
   } catch (error) {
-    at("caption").textContent = error.message;
+    if (error.name !== "AbortError") at("caption").textContent = error.message;
   }
-  state.busy = false;
-  if (state.again !== null) {
-    const next = state.again;
-    state.again = null;
-    draw(next);
-  } else if (!fine) {
-    clearTimeout(state.rest);
-    state.rest = setTimeout(() => draw(true), 250);
-  }
+  state.drawing = null;
+  const next = state.again;
+  state.again = null;
+  if (next !== null) draw(next);
+  else if (!fine) state.rest = setTimeout(() => draw(true), 250);
 }
 
 function moveTo(x, y) {
@@ -86,15 +95,19 @@ function moveTo(x, y) {
   draw(false);
 }
 
+// The last choice wins, in whatever order the answers come.
 async function blend() {
+  const asked = ++state.asked, chosen = [...state.chosen];
   at("caption").textContent = "Finding how their flakes become one another …";
-  state.blend = null;
   const answer = await ask("/v1/blends", {
     method: "POST",
     headers: { "Content-Type": "application/json", Prefer: "wait=30" },
-    body: JSON.stringify({ paints: state.ids }),
+    body: JSON.stringify({ paints: chosen.map(paint => paint.id) }),
   });
-  state.blend = (await whenDone(answer)).id;
+  const { id } = await whenDone(answer);
+  if (asked !== state.asked) return;
+  state.blend = id;
+  state.names = chosen.map(paint => paint.name);
   draw(false);
 }
 
@@ -103,14 +116,12 @@ async function begin() {
   if (paints.length < 3) throw new Error("There are fewer than three paints. Upload some, or start without --no-samples.");
   const first = wanted.map(name => paints.find(paint => paint.name === name));
   const chosen = first.every(Boolean) ? first : paints.slice(0, 3);
-  state.ids = chosen.map(paint => paint.id);
-  state.names = chosen.map(paint => paint.name);
+  state.chosen = [...chosen];
   at("paints").replaceChildren(...chosen.map((paint, k) => {
     const label = document.createElement("label"), select = document.createElement("select");
     select.append(...paints.map(each => new Option(each.name, each.id, false, each.id === paint.id)));
     select.addEventListener("change", () => {
-      state.ids[k] = select.value;
-      state.names[k] = select.selectedOptions[0].textContent;
+      state.chosen[k] = paints.find(each => each.id === select.value);
       blend().catch(failed);
     });
     label.append(["Top", "Left", "Right"][k], select);

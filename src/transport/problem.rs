@@ -84,7 +84,10 @@ pub enum TransportError {
     #[error("Sinkhorn epsilon {0} is not within 1e-9..=1e3")]
     Epsilon(f64),
     /// An iterative solver that ran out of steps before it met its promise.
-    #[error("not converged after {steps} steps: residual {residual:e}, promised {promised:e}")]
+    #[error(
+        "not converged after {steps} steps: residual {residual:e}, promised {promised:e}; a greater epsilon or the exact \
+         transport ends"
+    )]
     NotConverged {
         /// Steps made.
         steps: usize,

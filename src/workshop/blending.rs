@@ -96,7 +96,7 @@ fn widest(paint: &CarPaint) -> usize {
 /// How a paint's flakes were clustered, and what leaving out angles now costs.
 fn clustering_of(file: &PaintFile, wanted: &ClusterSettings) -> Option<Clustering> {
     let clustering = file.clustering.clone()?;
-    let step = wanted.angle_step / clustering.angle_step.max(1);
+    let step = wanted.angle_step / clustering.angle_step;
     match &file.paint.flakes {
         Some(flakes) if step > 1 => Some(Clustering {
             angle_step: wanted.angle_step,
@@ -116,7 +116,7 @@ fn reduced(
 ) -> Option<CarPaint> {
     let flakes = file.paint.flakes.as_ref()?;
     let had = file.clustering.as_ref().map_or(1, |c| c.angle_step);
-    let thinned = (wanted.angle_step / had.max(1) > 1).then(|| {
+    let thinned = (wanted.angle_step / had > 1).then(|| {
         let thinned = flakes.thinned(wanted.angle_step / had);
         notes.push(format!(
             "{}: {} of {} flake slices were used, every {}th angle",

@@ -4,23 +4,17 @@ use serde_json::{Value, json};
 
 use crate::accuracy::{blend_error, paint_error, sparkle};
 use crate::blend::{Blend, Order};
-use crate::paint::{ASPECULAR_DEG, Chi, PaintFile, Reflectance, instrument_pairs};
+use crate::export::readings;
+use crate::paint::{ASPECULAR_DEG, PaintFile};
 
 /// Parameters, readings, residuals with their floor, energy certificate, flake statistics and warnings of a paint.
 #[must_use]
 pub fn describe_paint(file: &PaintFile) -> Value {
     let paint = &file.paint;
-    let reflectance = Reflectance::new(paint);
-    let readings: Vec<Value> = ASPECULAR_DEG
-        .iter()
-        .zip(instrument_pairs())
-        .map(|(angle, (wi, wo))| {
-            let factor = reflectance
-                .evaluate(wi, wo, Chi::Table)
-                .map(|f| f * std::f64::consts::PI);
-            let lab = crate::color::Lab::from_rgb(factor);
-            json!({ "aspecular_deg": angle, "L": lab.l, "a": lab.a, "b": lab.b })
-        })
+    let readings: Vec<Value> = readings(paint, &ASPECULAR_DEG)
+        .into_iter()
+        .flat_map(|read| read.rows)
+        .map(|[angle, l, a, b]| json!({ "aspecular_deg": angle, "L": l, "a": a, "b": b }))
         .collect();
     let table = &paint.color_table;
     json!({

@@ -6,7 +6,7 @@ use super::WorkshopError;
 use super::ingest::{Measurement, table_of};
 use crate::measurement::{FlakePictures as _, MeasuredBrdf as _, Package, PackageBase};
 use crate::paint::{
-    CarPaint, Chi, Direction, HalfAngles, Limits, Reflectance, at_angles, fresnel, half_angles,
+    self, CarPaint, Chi, Direction, HalfAngles, Limits, Reflectance, at_angles, half_angles,
     refract,
 };
 
@@ -122,10 +122,7 @@ fn raw_package(package: &Package, pairs: &Pairs) -> Result<Vec<Option<[f64; 3]>>
     let (coat, ior) = (package.coat, package.coat.map_or(1.0, |c| c.ior));
     let through = |wi: Direction, wo: Direction, base: [f64; 3]| {
         let inner = half_angles(refract(wi, ior), refract(wo, ior));
-        let (transmission, flakes) = (
-            (1.0 - fresnel(wi[2], ior)) * (1.0 - fresnel(wo[2], ior)),
-            flakes(&inner),
-        );
+        let (transmission, flakes) = (paint::transmission(wi, wo, ior), flakes(&inner));
         std::array::from_fn(|k| transmission * (base[k] + flakes[k]))
     };
     let above = |w: Direction| w[2] > 0.0;

@@ -39,25 +39,50 @@ pub struct IngestOptions {
 }
 
 impl IngestOptions {
-    /// Refuses a paint that was clustered otherwise than the caller asked for.
+    /// Refuses options that only a measurement can follow.
+    fn check_measured(&self) -> Result<(), WorkshopError> {
+        let given = [
+            ("layout", self.read.layout.is_some()),
+            ("theta_h", self.read.theta_h.is_some()),
+            ("header_bytes", self.read.header_bytes.is_some()),
+            ("coat_ior", self.coat_ior.is_some()),
+        ];
+        match given.iter().find(|(_, given)| *given) {
+            None => Ok(()),
+            Some((field, _)) => Err(WorkshopError::usage(
+                field,
+                format!("{field} was given for a .paint, accepted is a measurement beside it"),
+            )),
+        }
+    }
+
+    /// [`check_clusters`] of what the caller asked for.
     pub(super) fn check_clusters(
         &self,
         name: &str,
         paint: &PaintFile,
     ) -> Result<(), WorkshopError> {
-        match (self.clusters, &paint.clustering) {
-            (Some(wanted), Some(had))
-                if had.clusters != wanted && paint.provenance.source != "blend" =>
-            {
-                let problem = format!(
-                    "{name} was clustered with {} clusters a slice, {wanted} were asked for: ingest its measurement again \
-                     with --clusters {wanted}, or leave the option out",
-                    had.clusters
-                );
-                Err(WorkshopError::usage("--clusters", problem))
-            }
-            _ => Ok(()),
+        self.clusters
+            .map_or(Ok(()), |wanted| check_clusters(name, paint, wanted))
+    }
+}
+
+/// Refuses a paint that was clustered otherwise than the caller asked for.
+///
+/// # Errors
+///
+/// [`WorkshopError`] with both numbers, and what to do.
+pub fn check_clusters(name: &str, paint: &PaintFile, wanted: usize) -> Result<(), WorkshopError> {
+    match &paint.clustering {
+        Some(had) if had.clusters != wanted && paint.provenance.source != "blend" => {
+            let problem = format!(
+                "{name} was clustered with {} clusters a slice, {wanted} were asked for: ingest its measurement again \
+                 with --clusters {wanted}, or leave the option out",
+                had.clusters
+            );
+            Err(WorkshopError::usage("--clusters", problem))
         }
+        _ => Ok(()),
     }
 }
 
@@ -194,15 +219,30 @@ pub fn ingest_upload(
             |bare: &BareMeasurement| bare.brdf.description().unwrap_or_default().to_owned();
         return ingest_called(path, options, description, progress).map_err(named);
     }
-    let bytes = read(path, &options.limits).map_err(named)?;
-    let mut paint = PaintFile::from_bytes(&bytes, &options.limits)
+    options.check_measured()?;
+    // It is held in memory as a whole, as a table is.
+    let limits = Limits {
+        bytes: options.limits.bytes.min(options.limits.table_bytes),
+        ..options.limits
+    };
+    let bytes = read(path, &limits).map_err(named)?;
+    let mut paint = PaintFile::from_bytes(&bytes, &limits)
         .map_err(|e| WorkshopError::input("the upload", e))?;
     options.check_clusters("the upload", &paint)?;
+    // What a file says of itself is checked where that can be done, and marked where not.
+    paint.energy = certify(&paint.paint);
+    if paint.residuals.is_some() || paint.clustering.is_some() {
+        paint.warnings.push(AS_UPLOADED.to_owned());
+    }
     if let Some(name) = &options.name {
         paint.name.clone_from(name);
     }
     Ok(paint)
 }
+
+/// Said of an uploaded `.paint`.
+const AS_UPLOADED: &str =
+    "residuals and errors are those that the uploaded .paint states; they were not measured here";
 
 /// A text as the name of a paint; where nothing is left of it, the layout's.
 fn as_name(text: &str, layout: Layout) -> String {

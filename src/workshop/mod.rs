@@ -12,6 +12,7 @@ mod estimate;
 mod evaluating;
 mod ingest;
 mod previewing;
+mod reading;
 mod realising;
 mod samples;
 mod selftest;
@@ -26,12 +27,13 @@ pub use error::{Fault, WorkshopError, accepted};
 pub use estimate::{Estimate, EstimatedError, Stage, Work, sample_to_estimate};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{
-    BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, ingest, ingest_upload,
-    open_measurement,
+    BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, check_clusters, ingest,
+    ingest_upload, open_measurement,
 };
 pub use previewing::{
     PictureFormat, PreviewLight, PreviewOptions, preview, read_environment, texels,
 };
+pub use reading::{MOST_ANGLES, readings};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
 pub use selftest::{Check, selftest};

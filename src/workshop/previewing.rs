@@ -86,23 +86,28 @@ pub fn preview(
     limits: &Limits,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Made, WorkshopError> {
-    let scene = scene_of(options, limits)?;
+    let scene = scene_of(options)?;
     let chosen = choose(thing, weights)?;
-    let rendering = render::render(&chosen.paint, &scene, progress).map_err(refused)?;
+    let rendering = render::render(&chosen.paint, &scene, limits, progress).map_err(refused)?;
     let bytes = match format {
         PictureFormat::Png => rendering.film.to_png(),
         PictureFormat::Exr => rendering.film.to_exr(),
     }
     .map_err(WorkshopError::internal)?;
-    let report = json!({
+    let mut report = json!({
         "realisation": chosen.report,
         "rendering": rendering.report,
         "error": error_of(thing, weights),
     });
+    let mut notes = chosen.notes;
+    if let Some(line) = scene.environment.held().line() {
+        report["environment"] = json!(scene.environment.held());
+        notes.push(line);
+    }
     Ok(Made {
         bytes,
         report,
-        notes: chosen.notes,
+        notes,
     })
 }
 
@@ -113,12 +118,12 @@ pub(super) fn sampling(
     options: &PreviewOptions,
     limits: &Limits,
 ) -> Result<SamplingError, WorkshopError> {
-    let scene = scene_of(options, limits)?;
+    let scene = scene_of(options)?;
     let chosen = choose(thing, weights)?;
-    render::sampling(&chosen.paint, &scene).map_err(refused)
+    render::sampling(&chosen.paint, &scene, limits).map_err(refused)
 }
 
-fn scene_of(options: &PreviewOptions, limits: &Limits) -> Result<Scene, WorkshopError> {
+fn scene_of(options: &PreviewOptions) -> Result<Scene, WorkshopError> {
     let shape: Shape = serde_json::from_value(json!(options.scene)).map_err(|_| {
         WorkshopError::usage(
             "scene",
@@ -141,12 +146,15 @@ fn scene_of(options: &PreviewOptions, limits: &Limits) -> Result<Scene, Workshop
         };
         scene.lights = lights.iter().map(light).collect();
     }
-    scene.validate(limits).map_err(refused)?;
     Ok(scene)
 }
 
 fn refused(error: RenderError) -> WorkshopError {
-    WorkshopError::usage("scene", error)
+    let field = match &error {
+        RenderError::Scene { field, .. } => field,
+        _ => "scene",
+    };
+    WorkshopError::usage(field, error)
 }
 
 /// The flakes at an angle pair in degrees, as the random texture draws them, as an EXR.

@@ -1,5 +1,6 @@
 //! What a caller names: a sample, a `.paint`, a `.blend` or a measurement.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use super::ingest::{IngestOptions, ingest};
@@ -69,17 +70,29 @@ pub fn find(name: &str) -> Result<Source, WorkshopError> {
 pub fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, WorkshopError> {
     let fail =
         |e: std::io::Error| WorkshopError::input(path.display(), format!("cannot be read: {e}"));
-    let length = std::fs::metadata(path).map_err(fail)?.len();
-    if length > limits.bytes {
-        let problem = format!("{length} bytes, accepted are up to {}", limits.bytes);
+    let known = std::fs::metadata(path).map_err(fail)?;
+    // A pipe or a device does not say how much is to come.
+    let most = if known.is_file() {
+        limits.bytes
+    } else {
+        limits.bytes.min(limits.table_bytes)
+    };
+    let mut bytes = Vec::new();
+    if known.len() <= most {
+        let file = std::fs::File::open(path).map_err(fail)?;
+        bytes.reserve(usize::try_from(known.len()).unwrap_or(0));
+        file.take(most + 1).read_to_end(&mut bytes).map_err(fail)?;
+    }
+    let length = known.len().max(bytes.len() as u64);
+    if length > most {
+        let problem = format!("{length} bytes or more, accepted are up to {most}");
         return Err(WorkshopError::input(path.display(), problem));
     }
-    std::fs::read(path).map_err(fail)
+    Ok(bytes)
 }
 
 /// First bytes of a file, to tell what it is; a folder has none.
 pub(super) fn first_bytes(path: &Path) -> Result<Vec<u8>, WorkshopError> {
-    use std::io::Read as _;
     if path.is_dir() {
         return Ok(Vec::new());
     }

@@ -1,5 +1,6 @@
 //! The real binary, as scripts call it.
 
+mod arguments;
 mod bundle;
 
 use std::fs;

@@ -10,7 +10,7 @@ use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
     App, Asked, Estimate, Fault, Format, IngestOrder, Picked, Picture, PictureFormat, Progress,
-    ServiceConfig, Target, Thing, View, WorkError, Works, Workshop, open, serve,
+    Readings, ServiceConfig, Target, Thing, View, WorkError, Works, Workshop, open, serve,
 };
 use carpaint::workshop::EstimatedError;
 use serde_json::{Value, json};
@@ -149,6 +149,10 @@ impl Works for Pretend {
             accuracy: "sampling-mean-de2000=0.5".to_owned(),
             report: json!({ "clamps": [], "plan": "whatever" }),
         })
+    }
+
+    fn readings(&self, paint: &Thing, angles: Option<&[f64]>) -> Result<Readings, WorkError> {
+        carpaint::service::Workshop::new(carpaint::paint::Limits::default()).readings(paint, angles)
     }
 
     fn estimate(&self, _: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError> {

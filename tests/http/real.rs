@@ -58,7 +58,7 @@ async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again
     let coarse = upload(&house, &metallic("ford_f8", 2)).await;
     assert_eq!(fine["provenance"]["simulated_flakes"], true);
     // Every angle that was measured is used: draft leaves out every second, and the grids would be the same.
-    let order = json!({ "paints": [fine["id"], coarse["id"]], "profile": { "clusters": 24 } });
+    let order = json!({ "paints": [fine["id"], coarse["id"]], "profile": { "clusters": 8 } });
     let blend = house.post_json("/v1/blends", &order.to_string()).await;
     assert_eq!(blend.status, 201, "{blend:?}");
     let blend = blend.json();
@@ -91,13 +91,33 @@ async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again
         json!([3.0, -2.0])
     );
     assert_eq!(&again["clamps"], clamps);
-    let order = json!({ "paints": [again["id"], fine["id"]], "clusters": 4 });
+    let order = json!({ "paints": [again["id"], fine["id"]], "clusters": 8 });
     let blend = house.post_json("/v1/blends", &order.to_string()).await;
     let reduced = blend.json()["correspondence"]["reduced"].clone();
     assert_eq!(
         (&reduced[0]["place"], &reduced[0]["to"]),
-        (&json!(0), &json!(4))
+        (&json!(0), &json!(8))
     );
+    let order = json!({ "paints": [fine["id"], coarse["id"]], "clusters": 7 });
+    let refused = house.post_json("/v1/blends", &order.to_string()).await;
+    let problem = refused.problem(422, "invalid-value");
+    assert_eq!(problem["pointer"], "/clusters", "{problem}");
+    let address = format!("{base}/realisation.zip?weights=1,0&profile=clusters%3D7");
+    house.get(&address).await.problem(400, "invalid-parameter");
+    house
+        .get(&format!("{base}/bundle.zip?max_error=1"))
+        .await
+        .problem(400, "invalid-parameter");
+    for option in [
+        "coat_ior=1.5",
+        "layout=merl",
+        "theta_h=sqrt",
+        "header_bytes=12",
+    ] {
+        let address = format!("/v1/paints?{option}");
+        let refused = house.ask("POST", &address, &[], &file.body).await;
+        refused.problem(400, "invalid-parameter");
+    }
     house.close().await;
 }
 

@@ -38,8 +38,18 @@ cp .cargo/mutants.toml "$crate/.cargo/"
   cp tests/stability/*.txt "$crate/tests/stability/"
 } > "$crate/src/lib.rs"
 
-# The manifest without its programs, examples and other tests; dependencies and profiles stay as they are.
-awk '/^\[\[/ { skip = 1 } /^\[[^[]/ { skip = 0 } !skip && !/^default-run/' Cargo.toml > "$crate/Cargo.toml"
+# The manifest without its programs, examples and other tests, and without the dependencies that these rooms never name.
+awk '/^\[\[/ { skip = 1 } /^\[[^[]/ { skip = 0 } !skip && !/^default-run/' Cargo.toml | while IFS= read -r line; do
+  case "$line" in
+    "["*) section="$line" ;;
+    [a-z]*" = "*)
+      name="${line%% = *}"
+      case "$section" in
+        *dependencies*) grep -rqE "(^|[^a-z_:])${name//-/_}(::|;)" "$crate/src" || continue ;;
+      esac ;;
+  esac
+  printf '%s\n' "$line"
+done > "$crate/Cargo.toml"
 printf '\n[workspace]\n' >> "$crate/Cargo.toml"
 
 # A twentieth of a per cent of the random problems: what a break does to transport shows in the first hundred.

@@ -468,7 +468,7 @@ fn ten_thousand_steps_of_the_weights_never_make_the_light_jump() {
     let mut t = 0.5;
     let mut before =
         Reflectance::new(&realise(&blend, &[0.5, 0.5]).paint).evaluate(wi, wo, Chi::Table)[1];
-    let mut steepest = 0.0_f64;
+    let (mut steepest, mut smallest) = (0.0_f64, 1.0_f64);
     for _ in 0..10_000 {
         let size = 10.0_f64.powf(random.within(-7.0, -1.0));
         let next = (t + size * random.within(-1.0, 1.0)).clamp(0.0, 1.0);
@@ -482,9 +482,16 @@ fn ten_thousand_steps_of_the_weights_never_make_the_light_jump() {
         );
         if step > 1e-5 {
             steepest = steepest.max((f - before).abs() / step);
+        } else if step > 0.0 {
+            smallest = smallest.min(step);
         }
         (t, before) = (next, f);
     }
-    // The bound is worth something: the walk uses a noticeable part of it.
+    // The bound is worth something: over the smallest steps it allows a thousandth of the light and less, so that a jump
+    // of more would have shown.
+    assert!(
+        lipschitz * smallest < 1e-3 * before,
+        "{lipschitz} {smallest} {before}"
+    );
     assert!(steepest > 1e-4 * lipschitz, "{steepest} of {lipschitz}");
 }

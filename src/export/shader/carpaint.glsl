@@ -194,9 +194,9 @@ uint carpaint_mix(uint x) {
     return (word >> 22u) ^ word;
 }
 
-// A number in 0..1 from the upper 24 bits.
+// A number strictly between 0 and 1 from the upper 23 bits: all that a float holds beside the half.
 float carpaint_unit(uint x) {
-    return (float(x >> 8u) + 0.5) / 16777216.0;
+    return (float(x >> 9u) + 0.5) / 8388608.0;
 }
 
 int carpaint_floor_div(int a, int b) {

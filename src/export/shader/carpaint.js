@@ -178,7 +178,7 @@ export function blendAt(paint, { weights, base = weights, flakeLightness = weigh
     lobes: paints[0].lobes.map((_, place) => blendedLobe(paints.map((p) => p.lobes[place]), base)),
   };
   if (!material.flakes) return { ...paint, material: blended };
-  const mix = (low, high, get) => hold(low, high, sum(paints, flakeLightness, (p) => get(p.flakes)));
+  const mix = (low, high, get) => hold(low, high, geometricMean(paints.map((p) => get(p.flakes)), flakeLightness));
   const [texel_um, grain_um] = [mix(1e-3, 1e5, (f) => f.texel_um), mix(1e-3, 1e6, (f) => f.grain_um)];
   const { tile } = material.flakes;
   blended.flakes = {
@@ -204,13 +204,17 @@ function blendedCoat(paints, weights) {
   return ior === 1 ? null : { ior, roughness, mirror: roughness < 1e-3 };
 }
 
-// Widths blend as weighted geometric means, weights and f0 linearly.
-function blendedLobe(lobes, weights) {
+// How widths, sizes and lasting angles blend: by their ratios.
+function geometricMean(values, weights) {
   const all = weights.reduce((a, w) => a + w, 0);
-  const share = weights.map((w) => (Math.abs(all) < 1e-9 ? 1 / lobes.length : w / all));
+  const share = weights.map((w) => (Math.abs(all) < 1e-9 ? 1 / values.length : w / all));
+  return Math.exp(sum(values, share, Math.log));
+}
+
+function blendedLobe(lobes, weights) {
   return {
     weight: [0, 1, 2].map((c) => hold(0, 1000, sum(lobes, weights, (lobe) => lobe.weight[c]))),
-    alpha: hold(1e-4, 10, Math.exp(sum(lobes, share, (lobe) => Math.log(lobe.alpha)))),
+    alpha: hold(1e-4, 10, geometricMean(lobes.map((lobe) => lobe.alpha), weights)),
     f0: hold(0, 1, sum(lobes, weights, (lobe) => lobe.f0)),
   };
 }

@@ -13,7 +13,7 @@ use super::extract::Address;
 use super::problem::{Kind, Problem, ProblemDocument};
 use super::{
     accuracy, blend_bundles, blends, documents, estimates, jobs, operations, paints, previews,
-    profile, realisations, runner, visibility, works,
+    profile, readings, realisations, runner, visibility, works,
 };
 
 /// Only what this service itself serves.
@@ -25,13 +25,13 @@ const POLICY: &str =
 #[openapi(
     info(
         title = "carpaint",
-        description = "Material synthesis for car paints: upload measurements, blend them, take realisations and pictures.\n\nEvery answer has a strong `ETag`, `Server-Timing` and `X-Request-Id`; `If-None-Match` is answered with 304. Every error is `application/problem+json` (RFC 9457). Unknown fields and parameters are refused. Requests that cannot be taken on now are answered with 503 and `Retry-After`.",
+        description = "Material synthesis for car paints: upload measurements, blend them, take realisations and pictures.\n\nEvery answer has `Server-Timing` and `X-Request-Id`, and what can be asked for again a strong `ETag`; `If-None-Match` is answered with 304. Every error is `application/problem+json` (RFC 9457). Unknown fields and parameters are refused. Requests that cannot be taken on now are answered with 503 and `Retry-After`.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     paths(
         paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete, visibility::change,
         blends::create, blends::show, blend_bundles::bundle,
-        realisations::of_blend, realisations::of_paint,
+        readings::show, readings::table, realisations::of_blend, realisations::of_paint,
         previews::of_blend, previews::of_paint, previews::create,
         estimates::create, accuracy::show,
         jobs::show, jobs::events, jobs::cancel,

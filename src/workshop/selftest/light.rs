@@ -1,7 +1,8 @@
 //! Checks of what a paint does with light: reflectance, color, and the flakes that texels draw.
 
-use super::{Check, Stream, Subject};
+use super::{Check, Subject};
 use crate::color::Lab;
+use crate::fit::Stream;
 use crate::paint::{Chi, Direction, FlakeSampler, HalfAngles, half_angles};
 
 /// Direction pairs from straight above to the last height a number can have, mirrored and opposite ones among them.
@@ -16,7 +17,7 @@ fn pairs() -> Vec<(Direction, Direction)> {
         .iter()
         .flat_map(|&z| turns.iter().map(move |&turn| at(z, turn)))
         .collect();
-    let mut random = Stream(1);
+    let mut random = Stream::new(1);
     let mut any = || {
         at(
             random.within(0.01, 1.0),
@@ -119,7 +120,7 @@ pub(super) fn texels(subject: &Subject<'_>) -> Vec<Check> {
     let sampler = FlakeSampler::new(flakes);
     let [h, d] = [&flakes.theta_h, &flakes.theta_d].map(|grid| grid.degrees()[0]);
     let want = flakes.slice(0, 0).mean();
-    let mut random = Stream(2);
+    let mut random = Stream::new(2);
     let draws = 100_000_u32;
     let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
     for _ in 0..draws {

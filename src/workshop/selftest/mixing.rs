@@ -1,8 +1,9 @@
 //! Checks of transport, blend, realisation, and of the machine under them.
 
-use super::{Check, Stream, Subject};
+use super::{Check, Subject};
 use crate::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use crate::color::ciede2000;
+use crate::fit::Stream;
 use crate::paint::{CarPaint, Chi, Limits, Reflectance};
 use crate::transport::{Cost, Method, Plan, Problem, Workspace, solve};
 
@@ -164,7 +165,7 @@ pub(super) fn steps(subject: &Subject<'_>) -> Vec<Check> {
         let at = |list: &[f64]| list[k % half].abs().max(list[k % half + half].abs());
         at(&a).max(at(&b))
     };
-    let mut random = Stream(3);
+    let mut random = Stream::new(3);
     let (mut t, mut before, mut worst) = (0.5, corners(at(&blend, [0.5, 0.5])), 0.0_f64);
     for _ in 0..200 {
         let size = 10.0_f64.powf(random.within(-6.0, -1.0));

@@ -97,25 +97,6 @@ pub fn selftest(
     Ok(checks)
 }
 
-/// Numbers in `0..1` from a seed (`SplitMix64` by Steele, Lea and Flood 2014).
-struct Stream(u64);
-
-impl Stream {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        #[allow(clippy::cast_precision_loss)] // 53 bits fit
-        let unit = (self.bits() >> 11) as f64 / (1_u64 << 53) as f64;
-        low + (high - low) * unit
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,7 +11,7 @@ use crate::accuracy::{PRESETS, Profile, blend_error, paint_error};
 use crate::blend::{BlendSettings, RealisationWeights};
 use crate::export::{ExportSettings, Precision};
 use crate::fit::{BoxRule, ClusterSettings};
-use crate::paint::PaintFile;
+use crate::paint::{Limits, PaintFile};
 use crate::render::{self, Film, Scene, Shape};
 use crate::transport::{Cost, Method};
 use crate::workshop::realising::realise as realise_to;
@@ -211,14 +211,22 @@ pub(super) fn blend(
     }
     let settings = distinct(settings);
     let count = settings.len();
-    let mut points = Vec::with_capacity(count);
+    let (mut points, mut without) = (Vec::with_capacity(count), Vec::new());
     for (k, of) in settings.into_iter().enumerate() {
         tell("blend", share(k, count, 0.25, 0.5));
         let paints: Vec<&PaintFile> = material.fitted(&of.profile.flakes, 2)?.iter().collect();
         let slow = matches!(of.profile.blend.method, Method::Sinkhorn { .. });
         let goes = if slow || options.quick { 1 } else { 5 };
         let profile = of.profile;
-        let (seconds, made) = shortest(goes, all(), || blend_paints(&paints, &profile, &|_| ()))?;
+        let go = || blend_paints(&paints, &profile, &|_| ());
+        let (seconds, made) = match shortest(goes, all(), go) {
+            // Smoothing that does not end on these paints is a finding, and says nothing about the other settings.
+            Err(error) if slow => {
+                without.push(format!("{}: {error}", of.label));
+                continue;
+            }
+            made => made?,
+        };
         let mut point = point(of, seconds, blend_error(&made.blend).lab);
         let report = made.blend.report();
         let gap = report.pairs.iter().map(|p| p.mean_gap).fold(0.0, f64::max);
@@ -230,13 +238,20 @@ pub(super) fn blend(
         );
         points.push(point);
     }
+    let mut about = "The error is that of the clusters, plus how much further than needed flakes travel between the paints: the plan's \
+         cost less its dual bound. The time is of two paints that are ingested already. Beside it stand the part of the \
+         error that is transport, and the largest color difference at the six instrument geometries between this blend and \
+         the exact one of the same clusters, at equal weights."
+        .to_owned();
+    if !without.is_empty() {
+        about.push_str(" Without an answer on these paints: ");
+        about.push_str(&without.join("; "));
+        about.push('.');
+    }
     Ok(Front::new(
         "blend",
         "Blend: which flakes of one paint become which of another",
-        "The error is that of the clusters, plus how much further than needed flakes travel between the paints: the plan's \
-         cost less its dual bound. The time is of two paints that are ingested already. Beside it stand the part of the \
-         error that is transport, and the largest color difference at the six instrument geometries between this blend and \
-         the exact one of the same clusters, at equal weights.",
+        &about,
         "Lab",
         points,
     ))
@@ -425,7 +440,9 @@ fn draw(
         seed,
         ..Scene::new(Shape::Sphere, [side; 2])
     };
-    let go = || render::render(&paint, &scene, &|_| ()).map_err(WorkshopError::internal);
+    let go = || {
+        render::render(&paint, &scene, &Limits::default(), &|_| ()).map_err(WorkshopError::internal)
+    };
     let (seconds, rendering) = shortest(goes, all(), go)?;
     Ok((seconds, rendering.film))
 }

@@ -6,7 +6,7 @@ use crate::accuracy::Profile;
 use crate::accuracy::study::Growth;
 use crate::fit::{BoxRule, ClusterSettings, Clusterer};
 use crate::measurement::SliceRoom;
-use crate::paint::{CarPaint, PaintFile};
+use crate::paint::{CarPaint, Limits, PaintFile};
 use crate::render::{self, Scene, Shape};
 use crate::workshop::blend_paints;
 
@@ -131,7 +131,10 @@ fn pixels(material: &mut Material, goes: usize) -> Result<Growth, WorkshopError>
             samples_per_pixel: 4,
             ..Scene::new(Shape::Sphere, [side; 2])
         };
-        let go = || render::render(&paint, &scene, &|_| ()).map_err(WorkshopError::internal);
+        let go = || {
+            render::render(&paint, &scene, &Limits::default(), &|_| ())
+                .map_err(WorkshopError::internal)
+        };
         let (seconds, _) = shortest(goes, rayon::current_num_threads(), go)?;
         points.push([f64::from(side * side), seconds]);
     }

@@ -1,0 +1,80 @@
+//! Readings: a paint under a virtual multi-angle instrument.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::extract::State;
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use super::answer::{Answer, Keep};
+use super::app::App;
+use super::extract::{Address, Query};
+use super::problem::{Problem, ProblemDocument};
+use super::works::{Readings, WorkError};
+
+/// Where an instrument looks from.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ReadingQuery {
+    /// Aspecular angles in degrees, above -45 and below 135, separated by commas; those of the six-angle instruments
+    /// unless given.
+    #[param(style = Form, explode = false, max_items = 256, example = json!([-15, 15, 25, 45, 75, 110]))]
+    angles: Option<Vec<f64>>,
+}
+
+/// Readings of a paint, as the `multi_angle` part of a measured-paint package.
+///
+/// L, a, b of the reflectance factor under D65 for the 2° observer, light at 45°, the coat's mirror image left out.
+#[utoipa::path(
+    get, operation_id = "paint_readings", path = "/v1/paints/{id}/readings", tag = "paints",
+    params(("id" = String, Path, description = "Paint"), ReadingQuery),
+    responses(
+        (status = 200, description = "A row for each angle, in the order asked for", body = serde_json::Value),
+        (status = 400, description = "An angle that no instrument reads at", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn show(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    Query(query): Query<ReadingQuery>,
+) -> Result<Answer, Problem> {
+    let begun = Instant::now();
+    let readings = read(&app, &id, query).await?;
+    Ok(Answer::json(&readings, Keep::Revalidated).stage("reading", begun.elapsed()))
+}
+
+/// Readings of a paint as comma-separated values, a line of column names first.
+#[utoipa::path(
+    get, operation_id = "paint_readings_table", path = "/v1/paints/{id}/readings.csv", tag = "paints",
+    params(("id" = String, Path, description = "Paint"), ReadingQuery),
+    responses(
+        (status = 200, description = "A line for each angle, in the order asked for", body = String, content_type = "text/csv"),
+        (status = 400, description = "An angle that no instrument reads at", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+    )
+)]
+pub async fn table(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    Query(query): Query<ReadingQuery>,
+) -> Result<Answer, Problem> {
+    let begun = Instant::now();
+    let readings = read(&app, &id, query).await?;
+    let name = format!("{id}.readings.csv");
+    Ok(
+        Answer::bytes("text/csv", readings.to_csv(), Keep::Revalidated)
+            .saved_as(&name)
+            .stage("reading", begun.elapsed()),
+    )
+}
+
+async fn read(app: &App, id: &str, query: ReadingQuery) -> Result<Readings, Problem> {
+    let paint = app.paint(id).await?;
+    let works = Arc::clone(&app.works);
+    let read = move || works.readings(&paint.thing, query.angles.as_deref());
+    app.bench.run(read).await?.map_err(WorkError::of_query)
+}

@@ -1,0 +1,28 @@
+//! A paint under a virtual multi-angle instrument.
+
+use super::error::WorkshopError;
+use crate::export::{self, Readings};
+use crate::paint::{ASPECULAR_DEG, PaintFile};
+
+/// Most angles that are read at once.
+pub const MOST_ANGLES: usize = 256;
+
+/// Reads a paint at these aspecular angles in degrees, at those of the six-angle instruments where none are asked for.
+///
+/// # Errors
+///
+/// [`WorkshopError`] for no or too many angles, and for one whose viewer is not above the paint.
+pub fn readings(
+    paint: &PaintFile,
+    aspecular_deg: Option<&[f64]>,
+) -> Result<Readings, WorkshopError> {
+    let angles = aspecular_deg.unwrap_or(&ASPECULAR_DEG);
+    if angles.is_empty() || angles.len() > MOST_ANGLES {
+        let message = format!(
+            "{} angles are given, accepted are 1 to {MOST_ANGLES}",
+            angles.len()
+        );
+        return Err(WorkshopError::usage("angles", message));
+    }
+    export::readings(&paint.paint, angles).map_err(|error| WorkshopError::usage("angles", error))
+}
