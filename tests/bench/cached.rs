@@ -27,7 +27,7 @@ fn main() -> Outcome<()> {
     if let Some(file) = word.as_deref().and_then(|w| w.strip_prefix("bare:")) {
         return bare(std::fs::read(file)?);
     }
-    let requests: usize = word.map_or(Ok(2000), |n| n.parse())?;
+    let requests: usize = word.map_or(Ok(10_000), |n| n.parse())?;
     let data = tempfile::tempdir()?;
     let carpaint = std::env::current_exe()?
         .ancestors()
