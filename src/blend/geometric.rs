@@ -8,7 +8,7 @@
 
 /// The mean of positive values; of equal ones themselves, and at weight 1 that paint's own to the bit. Even where the
 /// weights sum to less than 1e-9 in size. In `0..=f64::MAX`.
-pub(super) fn geometric_mean(values: impl Iterator<Item = f64> + Clone, weights: &[f64]) -> f64 {
+pub(super) fn geometric_mean(values: &(impl Iterator<Item = f64> + Clone), weights: &[f64]) -> f64 {
     let mut others = values.clone();
     if let Some(first) = others.next()
         && others.all(|other| other == first)
@@ -35,7 +35,7 @@ mod tests {
     use super::geometric_mean;
 
     fn mean<const N: usize>(values: [f64; N], weights: [f64; N]) -> f64 {
-        geometric_mean(values.into_iter(), &weights)
+        geometric_mean(&values.into_iter(), &weights)
     }
 
     #[test]

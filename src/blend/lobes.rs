@@ -95,7 +95,7 @@ pub(super) fn blend(places: &[Vec<Lobe>], weights: &[f64], ledger: &mut Ledger) 
         .iter()
         .map(|lobes| {
             let pairs = || lobes.iter().zip(weights);
-            let alpha = geometric_mean(lobes.iter().map(|lobe| lobe.alpha), weights);
+            let alpha = geometric_mean(&lobes.iter().map(|lobe| lobe.alpha), weights);
             Lobe {
                 weight: std::array::from_fn(|c| {
                     let s = pairs().map(|(lobe, w)| w * lobe.weight[c]).sum();

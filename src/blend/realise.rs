@@ -123,7 +123,7 @@ impl BlendedFlakes {
     /// Texel, grain and lifetime follow the weights of the lightness: they are how the sparkle looks.
     fn texture(&self, weights: &[f64], ledger: &mut Ledger) -> FlakeTexture {
         let mix = |get: &dyn Fn(&FlakeTexture) -> f64| {
-            geometric_mean(self.textures.iter().map(get), weights)
+            geometric_mean(&self.textures.iter().map(get), weights)
         };
         let mut angle = |field: &'static str, get: &dyn Fn(&FlakeTexture) -> f64| {
             ledger.hold(field, mix(get), 0.01, 1e4)

@@ -138,7 +138,10 @@ impl Ingest {
         if let Some(timings) = &self.timings {
             let (mut seconds, mut before) = (serde_json::Map::new(), Duration::ZERO);
             for (stage, end) in stages.take() {
-                seconds.insert(stage.to_owned(), json!((end - before).as_secs_f64()));
+                seconds.insert(
+                    stage.to_owned(),
+                    json!(end.saturating_sub(before).as_secs_f64()),
+                );
                 before = end;
             }
             seconds.insert("total".to_owned(), json!(before.as_secs_f64()));

@@ -81,11 +81,11 @@ pub(super) fn halves(
             hold(what, values, clamped);
         }
         list.convert_from_f32_slice(values);
-        let mut small = false;
-        for value in &*values {
-            small |= (value.abs() < HALF_MIN) & (*value != 0.0);
-        }
-        if small {
+        // Counted, not searched for: a search that may stop would go number by number.
+        let small = values
+            .iter()
+            .filter(|value| value.abs() < HALF_MIN && **value != 0.0);
+        if small.count() > 0 {
             for (half, value) in list.iter_mut().zip(&*values) {
                 if value.abs() < HALF_MIN {
                     *half = f16::from_f32(without_subnormals(*value));

@@ -126,7 +126,7 @@ impl Lot {
 }
 
 /// A picture's pixels in lots.
-pub(super) fn lots<'a>(planes: [&'a [f32]; 3]) -> impl Iterator<Item = [&'a [f32]; 3]> {
+pub(super) fn lots(planes: [&[f32]; 3]) -> impl Iterator<Item = [&[f32]; 3]> {
     let [red, green, blue] = planes.map(|plane| plane.chunks(LANES));
     red.zip(green).zip(blue).map(|((r, g), b)| [r, g, b])
 }

@@ -381,7 +381,7 @@ pub async fn create(
 ) -> Result<Answer, Problem> {
     let (thing, weights) = order.thing(&app).await?;
     let asked = order.profile.clone().unwrap_or_default();
-    asked.fits(&thing).map_err(|problem| problem.in_body())?;
+    asked.fits(&thing).map_err(Problem::in_body)?;
     let profile = asked.of_body()?;
     let spp = order.samples_per_pixel;
     let asked = View {
@@ -397,9 +397,7 @@ pub async fn create(
         .claim(&app, &format!("{key} {format:?}"))
         .await?;
     let drawn = draw(&app, thing, weights, format.drawn(), view).await;
-    Ok(drawn
-        .map_err(|problem| problem.in_body())?
-        .answer(format, None))
+    Ok(drawn.map_err(Problem::in_body)?.answer(format, None))
 }
 
 impl PreviewOrder {
@@ -438,10 +436,7 @@ impl PreviewOrder {
                     self.flake_saturation,
                 );
                 let weights = asked.for_blend(&blend.names);
-                Ok((
-                    Arc::clone(&blend),
-                    Some(weights.map_err(|problem| problem.in_body())?),
-                ))
+                Ok((Arc::clone(&blend), Some(weights.map_err(Problem::in_body)?)))
             }
             _ => Err(
                 Problem::value("/paint", "Neither or both of paint and blend are given.")

@@ -4,45 +4,21 @@ use crate::Desk;
 
 #[test]
 fn a_silly_value_is_refused_with_its_argument_and_what_is_accepted() {
-    let desk = Desk::new();
-    let paint = "sample:bmw339";
+    let (desk, paint) = (Desk::new(), "sample:bmw339");
+    let (blend, draw) = (
+        ["blend", paint, paint, "--out", "x"],
+        ["preview", paint, "--out", "x.png"],
+    );
+    let ingest = ["ingest", "x.zip", "--out", "x"];
     let numbers: &[(&[&str], &str, &str)] = &[
-        (
-            &["blend", paint, paint, "--out", "x"],
-            "--max-error",
-            "a number above 0",
-        ),
-        (
-            &["blend", paint, paint, "--out", "x"],
-            "--max-seconds",
-            "a number above 0",
-        ),
-        (
-            &["blend", paint, paint, "--out", "x"],
-            "--clusters",
-            "1 to 4096",
-        ),
-        (&["preview", paint, "--out", "x.png"], "--spp", "1 to 4096"),
-        (
-            &["preview", paint, "--out", "x.png"],
-            "--size",
-            "1 to 16384 each",
-        ),
-        (
-            &["preview", paint, "--out", "x.png"],
-            "--weights",
-            "finite numbers separated by commas",
-        ),
-        (
-            &["preview", paint, "--out", "x.png"],
-            "--base",
-            "finite numbers separated by commas",
-        ),
-        (
-            &["preview", paint, "--out", "x.png"],
-            "--flake-saturation",
-            "a finite number",
-        ),
+        (&blend, "--max-error", "a number above 0"),
+        (&blend, "--max-seconds", "a number above 0"),
+        (&blend, "--clusters", "1 to 4096"),
+        (&draw, "--spp", "1 to 4096"),
+        (&draw, "--size", "1 to 16384 each"),
+        (&draw, "--weights", "finite numbers separated by commas"),
+        (&draw, "--base", "finite numbers separated by commas"),
+        (&draw, "--flake-saturation", "a finite number"),
         (
             &["texels", paint, "--theta-h", "0", "--out", "x.exr"],
             "--theta-d",
@@ -67,24 +43,12 @@ fn a_silly_value_is_refused_with_its_argument_and_what_is_accepted() {
             "--seed",
             "0 to 4294967295",
         ),
-        (
-            &["ingest", "x.zip", "--out", "x"],
-            "--header-bytes",
-            "0 to 1048576",
-        ),
-        (&["ingest", "x.zip", "--out", "x"], "--coat-ior", "1 to 4"),
+        (&ingest, "--header-bytes", "0 to 1048576"),
+        (&ingest, "--coat-ior", "1 to 4"),
         (&["samples", "list"], "--threads", "1 to 1024"),
         (&["serve"], "--listen", "an IP address and a port"),
-        (
-            &["ingest", "x.zip", "--out", "x"],
-            "--layout",
-            "mpi-2005, merl, rgl, package",
-        ),
-        (
-            &["ingest", "x.zip", "--out", "x"],
-            "--theta-h",
-            "linear, sqrt",
-        ),
+        (&ingest, "--layout", "mpi-2005, merl, rgl, package"),
+        (&ingest, "--theta-h", "linear, sqrt"),
         (
             &["estimate", "realise", paint],
             "--format",
@@ -107,6 +71,12 @@ fn a_silly_value_is_refused_with_its_argument_and_what_is_accepted() {
             );
         }
     }
+    assert!(desk.files().is_empty());
+}
+
+#[test]
+fn a_number_below_zero_is_a_value_and_not_another_argument() {
+    let (desk, paint) = (Desk::new(), "sample:bmw339");
     for (argument, value) in [
         ("--max-error", "-1"),
         ("--max-seconds", "-2"),

@@ -381,6 +381,13 @@ fn ten_thousand_steps_of_the_weights_never_make_a_parameter_jump() {
     );
 }
 
+/// All corners of a paint's boxes.
+fn corners(paint: &CarPaint) -> Vec<[f64; 3]> {
+    let flakes = paint.flakes.as_ref().expect("has");
+    let all = flakes.lower.iter().chain(&flakes.upper);
+    all.map(|corner| corner.map(f64::from)).collect()
+}
+
 #[test]
 fn ten_thousand_steps_of_the_weights_never_make_the_light_jump() {
     // One direction pair, an uncoated paint: f = chi (a/π + Σ s F D M/π) + Ξ with M its geometry, all but D linear or
@@ -446,14 +453,6 @@ fn ten_thousand_steps_of_the_weights_never_make_the_light_jump() {
             .map(|n| n.to_array())
             .collect::<Vec<_>>()
     };
-    let boxes = |p: &CarPaint| {
-        let f = p.flakes.as_ref().expect("has");
-        f.lower
-            .iter()
-            .chain(&f.upper)
-            .map(|c| c.map(f64::from))
-            .collect::<Vec<_>>()
-    };
     let chi_slope = green([0, 1, 2].map(|k| axis_most(k, &table)));
     let chi_most = 2.89
         * 1.09
@@ -461,7 +460,7 @@ fn ten_thousand_steps_of_the_weights_never_make_the_light_jump() {
             + axis_most(1, &table) / 500.0
             + axis_most(2, &table) / 200.0)
             .powi(3);
-    let flake_slope = green([0, 1, 2].map(|k| axis_most(k, &boxes))) / pi;
+    let flake_slope = green([0, 1, 2].map(|k| axis_most(k, &corners))) / pi;
     let lipschitz = chi_slope * shape_most + chi_most * shape_slope + flake_slope;
 
     let mut random = Stream(33);

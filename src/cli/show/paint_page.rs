@@ -129,10 +129,11 @@ fn short(values: &[f64; 3]) -> String {
 
 /// What the instrument that came with the measurement says of the same angle.
 fn against(file: &PaintFile, aspecular_deg: f64) -> String {
-    let rows = file.readings.iter().flat_map(|of| &of.rows);
-    rows.filter(|row| row.aspecular_deg == aspecular_deg)
-        .map(|row| format!("   ΔE2000 to the lab's reading {:.2}", row.delta_e_2000))
-        .collect()
+    let mut rows = file.readings.iter().flat_map(|of| &of.rows);
+    let row = rows.find(|row| row.aspecular_deg == aspecular_deg);
+    row.map_or(String::new(), |row| {
+        format!("   ΔE2000 to the lab's reading {:.2}", row.delta_e_2000)
+    })
 }
 
 fn of_flakes(page: &mut Page, file: &PaintFile, flakes: &Flakes) {

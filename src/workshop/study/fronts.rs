@@ -145,6 +145,36 @@ pub(super) fn ingest(
     ))
 }
 
+/// Clusters, transport and angles turned together.
+fn turned_together() -> Vec<Setting> {
+    let standard = Profile::standard();
+    let mut settings = Vec::new();
+    for n in [12, 24, 50, 100] {
+        for (step, method, how) in [
+            (2, Method::Exact, "exact"),
+            (2, Method::Greedy, "greedy"),
+            (1, Method::Greedy, "greedy"),
+        ] {
+            let label = if step == 1 {
+                format!("{n} clusters, {how}")
+            } else {
+                format!("{n} clusters, {how}, every {step}. angle")
+            };
+            let profile = Profile {
+                flakes: clustered(n, BoxRule::Moments, step),
+                blend: BlendSettings {
+                    method,
+                    cost: Cost::Distance,
+                    ..standard.blend
+                },
+                ..standard
+            };
+            settings.push(setting(label, "together", profile));
+        }
+    }
+    settings
+}
+
 /// Clusters of two paints to one another.
 pub(super) fn blend(
     material: &mut Material,
@@ -189,25 +219,7 @@ pub(super) fn blend(
         settings.push(setting(label, "angle_step", with_flakes(flakes)));
     }
     if !options.quick {
-        for n in [12, 24, 50, 100] {
-            for (step, method, how) in [
-                (2, Method::Exact, "exact"),
-                (2, Method::Greedy, "greedy"),
-                (1, Method::Greedy, "greedy"),
-            ] {
-                let flakes = clustered(n, BoxRule::Moments, step);
-                let label = if step == 1 {
-                    format!("{n} clusters, {how}")
-                } else {
-                    format!("{n} clusters, {how}, every {step}. angle")
-                };
-                settings.push(setting(
-                    label,
-                    "together",
-                    by(flakes, method, Cost::Distance),
-                ));
-            }
-        }
+        settings.extend(turned_together());
     }
     let settings = distinct(settings);
     let count = settings.len();
