@@ -7,11 +7,14 @@ use crate::paint::Limits;
 use crate::workshop::previewing::{PictureFormat, PreviewOptions, preview, sampling};
 use crate::workshop::{Thing, WorkshopError};
 
-/// Pixels on the longer side of the two samples.
-const SIDES: [u32; 2] = [20, 56];
+/// Pixels on the longer side of the samples; the third is drawn where the second took hardly longer than the first.
+const SIDES: [u32; 3] = [20, 56, 160];
+
+/// How much longer a larger sample has to take, to tell drawing from getting ready.
+const LONGER: f64 = 3.0;
 
 /// Part of a larger sample's time that is at least proportional to the work.
-const LEAST_SHARE: f64 = 0.5;
+const LEAST_SHARE: f64 = 0.25;
 
 /// Samples per pixel from which on time is proportional to them.
 const ENOUGH: u32 = 8;
@@ -31,9 +34,14 @@ pub fn estimate_preview(
     written: bool,
 ) -> Result<Estimate, WorkshopError> {
     let [width, height] = options.size.map(f64::from);
-    let mut samples = Vec::new();
+    let mut samples: Vec<(f64, f64, (f64, f64))> = Vec::new();
     let batches = |spp: u32| f64::from(spp.div_ceil(ENOUGH));
     for side in SIDES {
+        if let [(_, first, _), .., (_, last, _)] = samples[..]
+            && last > LONGER * first
+        {
+            break;
+        }
         let scale = (f64::from(side) / width.max(height)).min(1.0);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pixels
         let size = options
@@ -54,15 +62,11 @@ pub fn estimate_preview(
     }
     let work = width * height * batches(options.samples_per_pixel);
     // Where something else slowed the smaller sample down, the line through both is flat and promises anything: less
-    // than half of what the larger says by itself is not believed.
-    let least = LEAST_SHARE * samples[1].1 / samples[1].0 * work;
-    let seconds = extrapolated(
-        (samples[0].0, samples[0].1),
-        (samples[1].0, samples[1].1),
-        work,
-    )
-    .max(least);
-    let bytes = extrapolated(samples[0].2, samples[1].2, width * height);
+    // than a part of what the larger says by itself is not believed.
+    let (first, last) = (samples[0], samples[samples.len() - 1]);
+    let least = LEAST_SHARE * last.1 / last.0 * work;
+    let seconds = extrapolated((first.0, first.1), (last.0, last.1), work).max(least);
+    let bytes = extrapolated(first.2, last.2, width * height);
     let (_, error) = timed(|| sampling(thing, weights, options, limits));
     let mut stages = vec![Stage {
         stage: "draw",
