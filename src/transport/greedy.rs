@@ -1,6 +1,6 @@
 //! A feasible plan at the price of a few passes over the costs, with the gap it may have.
 //!
-//! The plan is the exact solver's start. Three source duals are tried for its certificate: the tree's own, the row minima,
+//! The plan is the exact solver's start, the cheaper of a greedy and a monotone one. Three source duals are tried for its certificate: the tree's own, the row minima,
 //! and the row minima after subtracting each target's mean cost. Each is completed to the best target duals it allows;
 //! the best certificate is kept. Expect costs some ten percent above the optimum on paints that differ; the gap says how
 //! much at most.
@@ -9,7 +9,7 @@ use super::Solver;
 use super::cost::{Cost, LANES};
 use super::plan::Plan;
 use super::problem::{Problem, TransportError};
-use super::start::{greedy_start, mean_costs, row_minimum, steps_as_flows};
+use super::start::{cheaper_start, mean_costs, row_minimum, steps_as_flows};
 use super::vertex::Flow;
 use super::workspace::Workspace;
 
@@ -36,7 +36,7 @@ impl Solver for Greedy {
             target_duals,
             ..
         } = workspace;
-        greedy_start(matrix, units, start);
+        cheaper_start(problem, matrix, units, start);
         flows.clear();
         flows.extend(steps_as_flows(&start.steps));
         flows.sort_unstable_by_key(|flow| (flow.source, flow.target));

@@ -15,7 +15,7 @@
 use super::cost::{Cost, CostMatrix, LANES};
 use super::plan::{Plan, target_duals_for};
 use super::problem::{Problem, TransportError};
-use super::start::{StartMemory, column_of, greedy_start, row_minimum};
+use super::start::{StartMemory, cheaper_start, column_of, row_minimum};
 use super::tree::{Tree, for_each_point};
 use super::units::Units;
 use super::workspace::Workspace;
@@ -63,12 +63,12 @@ impl Solver for TransportSimplex {
         let points = problem.source().len().max(problem.target().len());
         let scratch = &mut simplex.scratch;
         let solved = match points {
-            0..=64 => job.run(&mut simplex.to_64, start, scratch, plan),
-            65..=128 => job.run(&mut simplex.to_128, start, scratch, plan),
-            129..=256 => job.run(&mut simplex.to_256, start, scratch, plan),
-            257..=512 => job.run(&mut simplex.to_512, start, scratch, plan),
-            513..=1024 => job.run(&mut simplex.to_1024, start, scratch, plan),
-            _ => job.run(&mut simplex.to_4096, start, scratch, plan),
+            0..=64 => job.dispatch(&mut simplex.to_64, start, scratch, plan),
+            65..=128 => job.dispatch(&mut simplex.to_128, start, scratch, plan),
+            129..=256 => job.dispatch(&mut simplex.to_256, start, scratch, plan),
+            257..=512 => job.dispatch(&mut simplex.to_512, start, scratch, plan),
+            513..=1024 => job.dispatch(&mut simplex.to_1024, start, scratch, plan),
+            _ => job.dispatch(&mut simplex.to_4096, start, scratch, plan),
         };
         if solved {
             return Ok(());
@@ -104,8 +104,44 @@ struct Job<'a> {
     most_pivots: usize,
 }
 
+/// A job with all it needs, compiled once for every processor and once for those with wide registers. Both do the same
+/// operations on the same lanes, so that the bits are the same.
+struct Run<'a, const W: usize> {
+    job: Job<'a>,
+    tree: &'a mut Tree<W>,
+    start: &'a mut StartMemory,
+    scratch: &'a mut Scratch,
+    plan: &'a mut Plan,
+}
+
+impl<const W: usize> pulp::NullaryFnOnce for Run<'_, W> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        self.job.run(self.tree, self.start, self.scratch, self.plan)
+    }
+}
+
 impl Job<'_> {
+    fn dispatch<const W: usize>(
+        self,
+        tree: &mut Tree<W>,
+        start: &mut StartMemory,
+        scratch: &mut Scratch,
+        plan: &mut Plan,
+    ) -> bool {
+        pulp::Arch::new().dispatch(Run {
+            job: self,
+            tree,
+            start,
+            scratch,
+            plan,
+        })
+    }
+
     /// Solves; false if the pivots ran out.
+    #[inline(always)]
     fn run<const W: usize>(
         &self,
         tree: &mut Tree<W>,
@@ -120,7 +156,7 @@ impl Job<'_> {
             target_values,
             allowed,
         } = scratch;
-        greedy_start(matrix, self.units, start);
+        cheaper_start(self.problem, matrix, self.units, start);
         tree.plant(sources, targets, &start.steps);
         source_values.clear();
         source_values.resize(sources, 0.0);
@@ -177,6 +213,7 @@ struct Pricing {
 
 impl Pricing {
     /// Pivots until every row in a round is priced right; false if the pivots ran out.
+    #[inline(always)]
     fn pivot_until_right<const W: usize>(
         &mut self,
         tree: &mut Tree<W>,

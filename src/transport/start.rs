@@ -1,10 +1,15 @@
-//! A feasible basis to begin with, or to make do with: cheapest target first, source by source.
+//! A feasible basis to begin with, or to make do with: the cheaper of two.
 //!
-//! Costs are judged after subtracting each target's mean cost, a first guess of its dual: a target far from everybody
-//! is then not shunned until only bad offers are left. Every step empties a source or fills a target, so the steps are
-//! the edges of a spanning tree, listed from the leaves up: each closes a point, whose parent is the other end.
+//! One is greedy: source by source, cheapest target first. Costs are judged after subtracting each target's mean cost, a
+//! first guess of its dual: a target far from everybody is then not shunned until only bad offers are left. The other is
+//! monotone: both clouds are sorted along the axis on which they spread most, and mass flows in that order. Where clouds
+//! lie near a line, as flakes of one hue do along lightness, it is nearly optimal, and the greedy one far from it.
+//!
+//! Every step empties a source or fills a target, so the steps are the edges of a spanning tree, listed from the leaves
+//! up: each closes a point, whose parent is the other end.
 
 use super::cost::{CostMatrix, LANES};
+use super::problem::Problem;
 use super::units::Units;
 use super::vertex::Flow;
 
@@ -32,7 +37,7 @@ pub(super) enum Closing {
 }
 
 /// The cheapest column of a row after subtracting the column's value.
-#[inline]
+#[inline(always)]
 pub(super) fn row_minimum(row: &[[f64; LANES]], values: &[[f64; LANES]]) -> f64 {
     let mut least = [f64::INFINITY; LANES];
     for (costs, values) in row.iter().zip(values) {
@@ -53,7 +58,7 @@ pub(super) fn row_minimum(row: &[[f64; LANES]], values: &[[f64; LANES]]) -> f64 
 }
 
 /// The first column that attains a row's minimum.
-#[inline]
+#[inline(always)]
 pub(super) fn column_of(row: &[[f64; LANES]], values: &[[f64; LANES]], minimum: f64) -> usize {
     for (block, (costs, values)) in row.iter().zip(values).enumerate() {
         let mut hit = false;
@@ -75,6 +80,16 @@ pub(super) struct StartMemory {
     pub steps: Vec<Closing>,
     values: Vec<[f64; LANES]>,
     left: Vec<i64>,
+    monotone: Monotone,
+}
+
+/// The memory of a monotone start.
+#[derive(Clone, Debug, Default)]
+struct Monotone {
+    steps: Vec<Closing>,
+    /// Places along the axis, and whose they are.
+    sources: Vec<(f64, usize)>,
+    targets: Vec<(f64, usize)>,
 }
 
 impl StartMemory {
@@ -127,6 +142,7 @@ pub(super) fn steps_as_flows(steps: &[Closing]) -> impl Iterator<Item = Flow> + 
 }
 
 /// Each target's mean cost over the sources, weighted by their supplies; 0 in the padding.
+#[inline(always)]
 pub(super) fn mean_costs(matrix: &CostMatrix, units: &Units, means: &mut [[f64; LANES]]) {
     means.fill([0.0; LANES]);
     let mut weights = 0.0;
@@ -152,12 +168,120 @@ pub(super) fn mean_costs(matrix: &CostMatrix, units: &Units, means: &mut [[f64; 
     }
 }
 
-/// Lists the steps of the start.
+/// Lists the steps of the cheaper start.
+#[inline(always)]
+pub(super) fn cheaper_start(
+    problem: &Problem,
+    matrix: &CostMatrix,
+    units: &Units,
+    memory: &mut StartMemory,
+) {
+    greedy_start(matrix, units, memory);
+    memory.monotone.run(problem, units);
+    if cost_of(&memory.monotone.steps, matrix) < cost_of(&memory.steps, matrix) {
+        std::mem::swap(&mut memory.steps, &mut memory.monotone.steps);
+    }
+}
+
+/// What the steps cost, mass counted in grains.
+fn cost_of(steps: &[Closing], matrix: &CostMatrix) -> f64 {
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "it only says which start is cheaper"
+    )]
+    steps_as_flows(steps)
+        .map(|flow| matrix.at(flow.source, flow.target) * flow.grains as f64)
+        .sum()
+}
+
+impl Monotone {
+    fn run(&mut self, problem: &Problem, units: &Units) {
+        let Self {
+            steps,
+            sources,
+            targets,
+        } = self;
+        let axis = widest_axis(problem);
+        for (places, cloud) in [
+            (&mut *sources, problem.source()),
+            (&mut *targets, problem.target()),
+        ] {
+            places.clear();
+            places.extend(cloud.points().iter().enumerate().map(|(k, p)| (p[axis], k)));
+            places.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        }
+        steps.clear();
+        let (mut sources, mut targets) = (sources.iter(), targets.iter());
+        let next = |places: &mut std::slice::Iter<'_, (f64, usize)>, grains: &[i64]| {
+            places.next().map(|&(_, point)| (point, grains[point]))
+        };
+        let (Some(mut source), Some(mut target)) = (
+            next(&mut sources, &units.supplies),
+            next(&mut targets, &units.demands),
+        ) else {
+            return;
+        };
+        loop {
+            // The last target stays open to the end, as the last source does until then.
+            if targets.len() == 0 || source.1 < target.1 && sources.len() > 0 {
+                steps.push(Closing::Source {
+                    closed: source.0,
+                    parent: target.0,
+                    grains: source.1,
+                });
+                target.1 -= source.1;
+                let Some(following) = next(&mut sources, &units.supplies) else {
+                    return;
+                };
+                source = following;
+            } else {
+                steps.push(Closing::Target {
+                    closed: target.0,
+                    parent: source.0,
+                    grains: target.1,
+                });
+                source.1 -= target.1;
+                let Some(following) = next(&mut targets, &units.demands) else {
+                    return;
+                };
+                target = following;
+            }
+        }
+    }
+}
+
+/// The axis on which both clouds together spread most, the first of equals.
+fn widest_axis(problem: &Problem) -> usize {
+    let points = || {
+        problem
+            .source()
+            .points()
+            .iter()
+            .chain(problem.target().points())
+    };
+    let spread: [f64; 3] = std::array::from_fn(|axis| {
+        let (low, high) = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| {
+            (low.min(p[axis]), high.max(p[axis]))
+        });
+        high - low
+    });
+    (1..3).fold(0, |widest, axis| {
+        if spread[axis] > spread[widest] {
+            axis
+        } else {
+            widest
+        }
+    })
+}
+
+/// Lists the steps of the greedy start.
+#[inline(always)]
 pub(super) fn greedy_start(matrix: &CostMatrix, units: &Units, memory: &mut StartMemory) {
     let StartMemory {
         steps,
         values,
         left,
+        ..
     } = memory;
     let sources = units.supplies.len();
     values.clear();

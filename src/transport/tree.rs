@@ -19,7 +19,7 @@ impl<const W: usize> PointSet<W> {
         targets: [0; W],
     };
 
-    #[inline]
+    #[inline(always)]
     fn join(&mut self, other: &Self) {
         for w in 0..W {
             self.sources[w] |= other.sources[w];
@@ -27,7 +27,7 @@ impl<const W: usize> PointSet<W> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn leave(&mut self, other: &Self) {
         for w in 0..W {
             self.sources[w] &= !other.sources[w];
@@ -35,25 +35,25 @@ impl<const W: usize> PointSet<W> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn without(mut self, other: &Self) -> Self {
         self.leave(other);
         self
     }
 }
 
-#[inline]
+#[inline(always)]
 fn holds<const W: usize>(words: &[u64; W], point: usize) -> bool {
     words[(point / 64) % W] >> (point % 64) & 1 == 1
 }
 
-#[inline]
+#[inline(always)]
 fn insert<const W: usize>(words: &mut [u64; W], point: usize) {
     words[(point / 64) % W] |= 1 << (point % 64);
 }
 
 /// Calls `visit` with every point of a set of words, ascending.
-#[inline]
+#[inline(always)]
 pub(super) fn for_each_point<const W: usize>(words: &[u64; W], mut visit: impl FnMut(usize)) {
     for (w, &word) in words.iter().enumerate() {
         let mut rest = word;
@@ -143,7 +143,7 @@ impl<const W: usize> Tree<W> {
     }
 
     /// Brings in the edge from `source` to `target` and takes out the edge whose flow falls to zero first.
-    #[inline]
+    #[inline(always)]
     pub(super) fn pivot(&mut self, source: usize, target: usize) -> Swing<W> {
         // Around the cycle the flow rises on the entering edge, and falls and rises in turn from there: it falls on the
         // edges from sources up on the source's way, from targets up on the target's way.
@@ -281,7 +281,7 @@ impl Cycle {
     ///
     /// Each way is its side's branches, the entering edge's point there, and how many points lie from it up to where the
     /// ways meet, that one not counted. The leaving edge lies on the first way.
-    #[inline]
+    #[inline(always)]
     fn swing<const W: usize>(
         &self,
         (near, start, mut near_way): (&mut [Branch<W>], usize, usize),
