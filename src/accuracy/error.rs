@@ -1,15 +1,15 @@
 //! The error of a result in one number, with the terms that it is made of.
 //!
 //! Flakes are distributions of color, and the distance between two of them is W1 in Lab: how far the average texel's
-//! color has moved. What the stages misplace adds up by the triangle inequality: pixels to clusters at ingest, box to
-//! written box in a file. To it comes, of a blend, how much further flakes travel between the paints than they would
-//! have to: cost of the plan less its dual bound.
+//! color has moved. What the stages misplace adds up by the triangle inequality: pixels to clusters at ingest, slices at
+//! angles that a profile leaves out, box to written box in a file. To it comes, of a blend, how much further flakes
+//! travel between the paints than they would have to: cost of the plan less its dual bound.
 //!
 //! ```text
-//! error = W1(pixels, clusters) + (cost − dual bound) + W1(box, rounded box)
+//! error = W1(pixels, clusters) + (cost − dual bound) + W1(slices left out, mixtures) + W1(box, rounded box)
 //! ```
 //!
-//! The reference profile's transport and files have none of the last two. A realisation outside the paints multiplies
+//! The reference profile's transport and files have none of the last three. A realisation outside the paints multiplies
 //! the first two by the sum of the weights' sizes.
 
 use serde::Serialize;
@@ -19,10 +19,10 @@ use crate::blend::Blend;
 use crate::paint::{Clustering, PaintFile};
 
 /// Error of a result against the reference: in Lab, the distance by which its flakes' colors are misplaced.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ResultError {
-    /// Sum of the terms that are known, Lab units.
-    pub lab: f64,
+    /// Sum of the terms, Lab units; null where one of them is not known.
+    pub lab: Option<f64>,
     /// What it is made of.
     pub terms: Vec<Term>,
 }
@@ -39,15 +39,18 @@ pub struct Term {
 }
 
 impl ResultError {
+    /// Of what has no flakes to misplace.
+    fn none() -> Self {
+        Self::of(Vec::new())
+    }
+
     fn of(terms: Vec<Term>) -> Self {
         Self {
-            lab: terms.iter().filter_map(|term| term.lab).sum(),
+            lab: terms.iter().map(|term| term.lab).sum(),
             terms,
         }
     }
-}
 
-impl ResultError {
     /// The same beyond the paints: every term times the sum of the weights' sizes, at least 1.
     #[must_use]
     pub fn stretched(&self, sum_of_sizes: f64) -> Self {
@@ -66,6 +69,7 @@ impl ResultError {
 
 const CLUSTERS: &str = "measured: W1 of lightness between pixels and clusters, nine of ten of the compared slices are within; \
                         of several paints the worst";
+const REALISED: &str = "bounded: error of the blend that a paint was realised from, where it is worse than what was measured of the others";
 const UNKNOWN: &str =
     "not known: the paint was not clustered here from pictures, or by an older version";
 const TRANSPORT: &str = "bounded: mean excess of the plans' cost over the dual bound; of several pairs of paints the worst";
@@ -77,7 +81,7 @@ const ROUNDING: &str = "bounded: W1 between the boxes and the boxes read back, w
 #[must_use]
 pub fn paint_error(file: &PaintFile) -> ResultError {
     if file.paint.flakes.is_none() {
-        return ResultError::default();
+        return ResultError::none();
     }
     ResultError::of(vec![clusters([file.clustering.as_ref()].into_iter())])
 }
@@ -87,7 +91,7 @@ pub fn paint_error(file: &PaintFile) -> ResultError {
 pub fn blend_error(blend: &Blend) -> ResultError {
     let report = blend.report();
     if report.slices == 0 {
-        return ResultError::default();
+        return ResultError::none();
     }
     // A paint without flakes is exact.
     let with_flakes = blend.clusterings().enumerate().filter(|(k, _)| {
@@ -128,15 +132,24 @@ pub fn file_error(of: &ResultError, writing: Option<&WritingError>) -> ResultErr
 
 fn clusters<'a>(of: impl Iterator<Item = Option<&'a Clustering>>) -> Term {
     let mut worst = Some(0.0_f64);
+    let mut realised = false;
     for clustering in of {
-        let own = clustering
-            .and_then(|c| c.error.as_ref())
-            .map(|e| e.lightness_w1.p90);
+        let measured = clustering.and_then(|c| c.error.as_ref());
+        let own = measured.map(|e| e.lightness_w1.p90).or_else(|| {
+            let of_blend = clustering?.realised_lab?;
+            realised = true;
+            Some(of_blend)
+        });
         worst = worst.zip(own).map(|(worst, own)| worst.max(own));
     }
+    let how = match worst {
+        None => UNKNOWN,
+        Some(_) if realised => REALISED,
+        Some(_) => CLUSTERS,
+    };
     Term {
         what: "clusters",
         lab: worst,
-        how: if worst.is_some() { CLUSTERS } else { UNKNOWN },
+        how,
     }
 }

@@ -12,7 +12,7 @@ use super::boxes::mix_boxes;
 use super::clamp::{Clamp, Ledger};
 use super::geometric::geometric_mean;
 use super::{Blend, BlendedFlakes, Boxes, RealisationWeights, WeightError, base, lobes};
-use crate::paint::{CarPaint, FlakeTexture, Flakes};
+use crate::paint::{CarPaint, FlakeTexture, Flakes, GRAINS_UM, LIFETIMES_DEG, TEXELS_UM};
 
 /// A synthesised paint and the account of what had to be clamped.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,7 +126,7 @@ impl BlendedFlakes {
             geometric_mean(&self.textures.iter().map(get), weights)
         };
         let mut angle = |field: &'static str, get: &dyn Fn(&FlakeTexture) -> f64| {
-            ledger.hold(field, mix(get), 0.01, 1e4)
+            ledger.hold(field, mix(get), LIFETIMES_DEG[0], LIFETIMES_DEG[1])
         };
         let lifetime_deg = [
             angle("flakes.lifetime_deg", &|t| t.lifetime_deg[0]),
@@ -137,8 +137,18 @@ impl BlendedFlakes {
             angle("flakes.persistence_deg", &|t| t.persistence_deg[1]),
         ];
         FlakeTexture {
-            texel_um: ledger.hold("flakes.texel_um", mix(&|t| t.texel_um), 1e-3, 1e5),
-            grain_um: ledger.hold("flakes.grain_um", mix(&|t| t.grain_um), 1e-3, 1e6),
+            texel_um: ledger.hold(
+                "flakes.texel_um",
+                mix(&|t| t.texel_um),
+                TEXELS_UM[0],
+                TEXELS_UM[1],
+            ),
+            grain_um: ledger.hold(
+                "flakes.grain_um",
+                mix(&|t| t.grain_um),
+                GRAINS_UM[0],
+                GRAINS_UM[1],
+            ),
             lifetime_deg,
             persistence_deg,
         }

@@ -95,13 +95,16 @@ impl Blend {
         }
         let report = made.blend.report();
         eprintln!(
-            "{}: {} · {} slices, {} clusters, mean transport {:.2}, error {:.3} Lab",
+            "{}: {} · {} slices, {} clusters, mean transport {:.2}, error {}",
             self.out.display(),
             names.join(" + "),
             report.slices,
             report.clusters,
             report.mean_cost,
-            blend_error(&made.blend).lab
+            match blend_error(&made.blend).lab {
+                Some(lab) => format!("{lab:.3} Lab"),
+                None => "not known".to_owned(),
+            }
         );
         Ok(())
     }

@@ -127,7 +127,7 @@ impl Estimate {
         println!("profile: {}", estimate.profile);
         println!("seconds: {:.3} ({})", estimate.seconds, stages.join(", "));
         println!("bytes: {}", estimate.bytes);
-        println!("error: {:.4} {}", estimate.error.value, estimate.error.unit);
+        println!("error: {}", estimate.error);
         Ok(())
     }
 

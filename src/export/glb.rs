@@ -11,19 +11,15 @@ use super::gltf_brdf::dielectric_f0;
 use super::gltf_fit::{fit, loss};
 use super::gltf_material::{extras, material_json};
 use super::gltf_mesh::{Mesh, ball};
-use super::{About, ExportError, ExportSettings};
+use super::{About, ExportError};
 use crate::paint::{CarPaint, Flakes, RandomTexture, Reflectance};
 
-/// The GLB of a paint. Settings of textures do not change it: its lists are 32-bit, its pictures 8-bit.
+/// The GLB of a paint. Its lists are 32-bit, its pictures 8-bit, whatever a bundle's textures would be.
 ///
 /// # Errors
 ///
 /// [`ExportError`] for a number that is not finite, or a picture that cannot be encoded.
-pub fn glb(
-    paint: &CarPaint,
-    about: &About,
-    _settings: &ExportSettings,
-) -> Result<Vec<u8>, ExportError> {
+pub fn glb(paint: &CarPaint, about: &About) -> Result<Vec<u8>, ExportError> {
     let reflectance = Reflectance::new(paint);
     let (mut material, mut report) = fit(&reflectance);
     let mut file = Builder::default();
@@ -46,9 +42,8 @@ pub fn glb(
     let mesh = ball(tile_um);
     let primitive = file.mesh(&mesh, baked.is_some())?;
     let textures = baked.as_ref().map(|baked| file.pictures(baked));
-    let (shading, used) = material_json(&about.name, &material, textures);
+    let (mut shading, used) = material_json(&about.name, &material, textures);
     let lists = file.paint_lists(paint)?;
-    let mut shading = shading;
     shading["extras"] = json!({ "carpaint": extras(paint, about, &report, &lists, mesh.radius) });
     let mut document = json!({
         "asset": { "version": "2.0", "generator": "carpaint" },
@@ -134,14 +129,8 @@ impl Builder {
         const ELEMENTS: Option<u32> = Some(34963);
         let mut attributes = Map::new();
         let positions = self.floats("positions", &mesh.positions, VERTICES)?;
-        let radius = mesh
-            .positions
-            .iter()
-            .flatten()
-            .fold(0.0_f32, |m, v| m.max(v.abs()));
         self.accessors[positions]["min"] = bounds(&mesh.positions, f32::min).into();
         self.accessors[positions]["max"] = bounds(&mesh.positions, f32::max).into();
-        debug_assert!(radius.is_finite(), "a ball has a size");
         attributes.insert("POSITION".into(), positions.into());
         attributes.insert(
             "NORMAL".into(),
@@ -278,7 +267,7 @@ mod tests {
     #[test]
     fn the_chunks_are_whole_and_the_same_every_time() {
         let paint = metallic(6, 5, 20);
-        let write = || glb(&paint, &about(), &ExportSettings::default()).expect("written");
+        let write = || glb(&paint, &about()).expect("written");
         let bytes = write();
         let (document, body) = parse(&bytes);
         assert_eq!(document["buffers"][0]["byteLength"], body.len());
@@ -288,7 +277,7 @@ mod tests {
     #[test]
     fn the_flakes_can_be_read_back_from_the_extras() {
         let paint = metallic(6, 5, 20);
-        let bytes = glb(&paint, &about(), &ExportSettings::default()).expect("written");
+        let bytes = glb(&paint, &about()).expect("written");
         let (document, body) = parse(&bytes);
         let carpaint = &document["materials"][0]["extras"]["carpaint"];
         let index =
@@ -314,7 +303,7 @@ mod tests {
                 ..paint
             },
         ] {
-            let bytes = glb(&paint, &about(), &ExportSettings::default()).expect("written");
+            let bytes = glb(&paint, &about()).expect("written");
             let (document, _) = parse(&bytes);
             assert_documented(&document["materials"][0]["extras"]["carpaint"]);
         }
@@ -326,7 +315,7 @@ mod tests {
             flakes: None,
             ..metallic(1, 1, 1)
         };
-        let bytes = glb(&paint, &about(), &ExportSettings::default()).expect("written");
+        let bytes = glb(&paint, &about()).expect("written");
         let (document, _) = parse(&bytes);
         assert!(
             document.get("images").is_none()
@@ -338,6 +327,6 @@ mod tests {
     fn a_number_that_is_not_finite_is_refused() {
         let mut paint = metallic(2, 2, 3);
         paint.flakes.as_mut().expect("flakes").upper[1][2] = f32::INFINITY;
-        assert!(glb(&paint, &about(), &ExportSettings::default()).is_err());
+        assert!(glb(&paint, &about()).is_err());
     }
 }

@@ -113,7 +113,7 @@ pub(super) const REPORT: &[Number] = &[
     ("report.correspondence.reduced[].place", "1", (0.0, 4.0), "place of a paint whose clusters were reduced"),
     ("report.correspondence.reduced[].from", "1", (1.0, ANY), "clusters of its widest slice before"),
     ("report.correspondence.reduced[].to", "1", (1.0, ANY), "clusters of its widest slice after"),
-    ("report.accuracy.error.lab", "CIELAB", (0.0, ANY), "distance by which the flakes' colors are misplaced against the reference profile: sum of the known terms"),
+    ("report.accuracy.error.lab", "CIELAB", (0.0, ANY), "distance by which the flakes' colors are misplaced against the reference profile: sum of the terms, null where one is not known"),
     ("report.accuracy.error.terms[].lab", "CIELAB", (0.0, ANY), "one term of it, null where it is not known; `how` says how it is"),
     ("report.accuracy.writing.rounding_w1", "CIELAB", (0.0, ANY), "bound on the distance W1 between the paint's flakes and those of the textures, worst of the slices at the instrument geometries"),
     ("report.accuracy.writing.instrument[]", "CIEDE2000", (0.0, ANY), "difference of the mean color by the textures, per instrument geometry"),

@@ -145,6 +145,7 @@ pub fn fit_flakes(
         )),
         left_out_w1: None,
         error: None,
+        realised_lab: None,
     };
     Ok(FittedFlakes {
         flakes,

@@ -13,7 +13,7 @@
 //! so the product of two luminances is a polynomial of degree six on each piece.
 
 use super::grain::Luminance;
-use crate::paint::Slice;
+use crate::paint::{LIFETIMES_DEG, Slice};
 
 /// Angle that a flake's number is kept for when nothing in the slices ever makes it change, degrees.
 pub(super) const ENDLESS_DEG: f64 = 1e4;
@@ -63,12 +63,12 @@ pub(super) fn lifetime(
         let (last, fell) = (offsets[known], curve[known]);
         let kept = (fell / in_step(known)).clamp(0.0, 1.0);
         let persistence_deg = if kept < 1.0 {
-            (last / (1.0 - kept)).min(ENDLESS_DEG)
+            (last / (1.0 - kept)).clamp(LIFETIMES_DEG[0], ENDLESS_DEG)
         } else {
             ENDLESS_DEG
         };
         return Lifetime {
-            lifetime_deg: last,
+            lifetime_deg: last.max(LIFETIMES_DEG[0]),
             persistence_deg,
         };
     };
@@ -95,8 +95,8 @@ pub(super) fn lifetime(
         }
     }
     Lifetime {
-        lifetime_deg: crossing,
-        persistence_deg: (low * high).sqrt(),
+        lifetime_deg: crossing.max(LIFETIMES_DEG[0]),
+        persistence_deg: (low * high).sqrt().max(LIFETIMES_DEG[0]),
     }
 }
 

@@ -58,6 +58,9 @@ pub struct Clustering {
     /// How far the clusters are from the pixels, where it was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<ClusteringError>,
+    /// Error in Lab of the blend that the paint was realised from; no pictures of it exist to compare with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub realised_lab: Option<f64>,
 }
 
 impl Clustering {
@@ -77,6 +80,12 @@ impl Clustering {
         }
         if !(1..=90).contains(&self.angle_step) {
             return refuse("angle_step", &self.angle_step, "1 to 90");
+        }
+        if let Some(lab) = self
+            .realised_lab
+            .filter(|lab| !(*lab >= 0.0 && lab.is_finite()))
+        {
+            return refuse("realised_lab", &lab, "0 or more, or nothing");
         }
         Ok(())
     }

@@ -55,7 +55,9 @@ pub use residuals::{
 };
 pub use shared_list::SharedList;
 pub use sparkle::{FlakeSampler, TexelDraw, cumulative};
-pub use validate::{MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError};
+pub use validate::{
+    GRAINS_UM, LIFETIMES_DEG, MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError, TEXELS_UM,
+};
 
 use crate::color::LinearRgb;
 

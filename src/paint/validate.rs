@@ -13,6 +13,13 @@ pub const MAX_WEIGHT: f64 = 1e3;
 /// Largest magnitude of L, a or b of a box or a table color.
 pub const MAX_LAB: f64 = 2000.0;
 
+/// Least and largest texel, µm.
+pub const TEXELS_UM: [f64; 2] = [1e-3, 1e5];
+/// Least and largest grain, µm.
+pub const GRAINS_UM: [f64; 2] = [1e-3, 1e6];
+/// Least and largest lifetime and persistence, degrees: a hundredth is far below what any instrument's lens accepts.
+pub const LIFETIMES_DEG: [f64; 2] = [0.01, 1e4];
+
 /// Why parameters are no paint. Names the field as a path, the value, and what is accepted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -242,25 +249,30 @@ impl Flakes {
         within(
             || "flakes.texel_um".into(),
             t.texel_um,
-            f64::MIN_POSITIVE,
-            1e5,
-            "above 0, to 100000",
+            TEXELS_UM[0],
+            TEXELS_UM[1],
+            "0.001 to 100000",
         )?;
         within(
             || "flakes.grain_um".into(),
             t.grain_um,
-            f64::MIN_POSITIVE,
-            1e6,
-            "above 0, to 1000000",
+            GRAINS_UM[0],
+            GRAINS_UM[1],
+            "0.001 to 1000000",
         )?;
-        for angle in t.lifetime_deg.iter().chain(&t.persistence_deg) {
-            within(
-                || "flakes.lifetime_deg".into(),
-                *angle,
-                f64::MIN_POSITIVE,
-                1e4,
-                "above 0, to 10000",
-            )?;
+        for (field, angles) in [
+            ("flakes.lifetime_deg", t.lifetime_deg),
+            ("flakes.persistence_deg", t.persistence_deg),
+        ] {
+            for (axis, angle) in angles.into_iter().enumerate() {
+                within(
+                    || format!("{field}[{axis}]"),
+                    angle,
+                    LIFETIMES_DEG[0],
+                    LIFETIMES_DEG[1],
+                    "0.01 to 10000",
+                )?;
+            }
         }
         Ok(())
     }

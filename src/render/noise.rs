@@ -46,7 +46,8 @@ pub(super) fn sampling_error(
     while width.div_ceil(stride) * height.div_ceil(stride) > PROBED {
         stride += 1;
     }
-    let along = |length: u32| (stride / 2..length).step_by(stride as usize);
+    // A side shorter than half a stride has its last pixel.
+    let along = |length: u32| ((stride / 2).min(length - 1)..length).step_by(stride as usize);
     let lattice: Vec<(u32, u32)> = along(height)
         .flat_map(|y| along(width).map(move |x| (x, y)))
         .collect();

@@ -96,15 +96,31 @@ fn widest(paint: &CarPaint) -> usize {
 /// How a paint's flakes were clustered, and what leaving out angles now costs.
 fn clustering_of(file: &PaintFile, wanted: &ClusterSettings) -> Option<Clustering> {
     let clustering = file.clustering.clone()?;
-    let step = wanted.angle_step / clustering.angle_step;
-    match &file.paint.flakes {
-        Some(flakes) if step > 1 => Some(Clustering {
-            angle_step: wanted.angle_step,
-            left_out_w1: Some(left_out_w1(flakes, step)),
-            ..clustering
-        }),
-        _ => Some(clustering),
-    }
+    let flakes = file.paint.flakes.as_ref()?;
+    // What taking several clusters for one misplaces is not measured.
+    let realised_lab = clustering
+        .realised_lab
+        .filter(|_| !wants_fewer(file, flakes, wanted));
+    let step = angle_step(file, wanted);
+    Some(Clustering {
+        angle_step: clustering.angle_step * step,
+        left_out_w1: (step > 1)
+            .then(|| left_out_w1(flakes, step))
+            .or(clustering.left_out_w1),
+        realised_lab,
+        ..clustering
+    })
+}
+
+/// Every how many-th of a paint's own angles is used.
+fn angle_step(file: &PaintFile, wanted: &ClusterSettings) -> usize {
+    let had = file.clustering.as_ref().map_or(1, |c| c.angle_step);
+    (wanted.angle_step / had).max(1)
+}
+
+/// Whether a paint came from a blend, with more clusters than the profile has.
+fn wants_fewer(file: &PaintFile, flakes: &Flakes, wanted: &ClusterSettings) -> bool {
+    file.provenance.source == "blend" && flakes.widest_slice() > wanted.clusters
 }
 
 /// The paint as the profile wants it: with fewer angles if it was fitted at more, and, if it came from a blend and has
@@ -115,29 +131,27 @@ fn reduced(
     notes: &mut Vec<String>,
 ) -> Option<CarPaint> {
     let flakes = file.paint.flakes.as_ref()?;
-    let had = file.clustering.as_ref().map_or(1, |c| c.angle_step);
-    let thinned = (wanted.angle_step / had > 1).then(|| {
-        let thinned = flakes.thinned(wanted.angle_step / had);
+    let step = angle_step(file, wanted);
+    let thinned = (step > 1).then(|| {
+        let thinned = flakes.thinned(step);
         notes.push(format!(
-            "{}: {} of {} flake slices were used, every {}th angle",
+            "{}: {} of {} flake slices were used, those at each {step}. of its angles",
             file.name,
             thinned.slices(),
             flakes.slices(),
-            wanted.angle_step
         ));
         thinned
     });
     let flakes = thinned.as_ref().unwrap_or(flakes);
-    let fewer = (file.provenance.source == "blend" && flakes.widest_slice() > wanted.clusters)
-        .then(|| {
-            notes.push(format!(
-                "{}: up to {} clusters a slice were reduced to {}",
-                file.name,
-                flakes.widest_slice(),
-                wanted.clusters
-            ));
-            reduce_clusters(flakes, wanted.clusters)
-        });
+    let fewer = wants_fewer(file, flakes, wanted).then(|| {
+        notes.push(format!(
+            "{}: up to {} clusters a slice were reduced to {}",
+            file.name,
+            flakes.widest_slice(),
+            wanted.clusters
+        ));
+        reduce_clusters(flakes, wanted.clusters)
+    });
     fewer.or(thinned).map(|flakes| CarPaint {
         flakes: Some(flakes),
         ..file.paint.clone()

@@ -180,9 +180,11 @@ pub fn realise(
         });
     }
     let mut chosen = choose(thing, weights)?;
+    let error = error_of(thing, weights);
     if format != Format::Paint {
-        let error = error_of(thing, weights);
-        chosen.report["accuracy"] = accuracy(&error, &chosen.paint, &profile.export);
+        // Only textures are rounded: a GLB carries its lists as they are.
+        let textures = (format != Format::Glb).then_some(&profile.export);
+        chosen.report["accuracy"] = accuracy(&error, &chosen.paint, textures);
     }
     let about = About {
         name: chosen.name.clone(),
@@ -191,11 +193,11 @@ pub fn realise(
     };
     let bytes = match format {
         Format::Zip => export::bundle(&chosen.paint, &about, &profile.export),
-        Format::Glb => export::glb(&chosen.paint, &about, &profile.export),
+        Format::Glb => export::glb(&chosen.paint, &about),
         Format::Json => export::material_json(&chosen.paint, &about, &profile.export),
         Format::Paint => {
             return Ok(Made {
-                bytes: paint_file(&chosen).to_bytes(),
+                bytes: paint_file(&chosen, &error).to_bytes(),
                 report: chosen.report,
                 notes: chosen.notes,
             });
@@ -210,8 +212,8 @@ pub fn realise(
 }
 
 /// How far the file is from what the reference profile would have given, and its sparkle.
-fn accuracy(of: &ResultError, paint: &CarPaint, settings: &ExportSettings) -> Value {
-    let writing = writing_error(paint, settings);
+fn accuracy(of: &ResultError, paint: &CarPaint, textures: Option<&ExportSettings>) -> Value {
+    let writing = textures.and_then(|settings| writing_error(paint, settings));
     json!({
         "error": file_error(of, writing.as_ref()),
         "writing": writing,
@@ -233,7 +235,7 @@ pub(super) fn error_of(thing: &Thing, weights: Option<&RealisationWeights>) -> R
 }
 
 /// A realised paint as a paint of its own.
-fn paint_file(chosen: &Chosen) -> PaintFile {
+fn paint_file(chosen: &Chosen, error: &ResultError) -> PaintFile {
     let clustering = chosen.paint.flakes.as_ref().map(|f| Clustering {
         clusters: f.widest_slice(),
         box_rule: "blended".to_owned(),
@@ -241,6 +243,7 @@ fn paint_file(chosen: &Chosen) -> PaintFile {
         w1_bound: None,
         left_out_w1: None,
         error: None,
+        realised_lab: error.lab,
     });
     PaintFile {
         name: chosen.name.chars().take(200).collect(),

@@ -7,7 +7,7 @@
 use serde::Serialize;
 
 use super::estimate::{Estimate, Work};
-use super::realising::{choose, error_of};
+use super::realising::{Format, choose, error_of};
 use super::{WorkshopError, blend_paints};
 use crate::accuracy::{Profile, blend_error, file_error, writing_error};
 use crate::export::{ExportSettings, Precision};
@@ -54,10 +54,8 @@ impl Picked {
             ..
         } = &self.estimate;
         format!(
-            "{}; profile={profile}, error={:.4} {}, seconds={seconds:.3}",
+            "{}; profile={profile}, error={error}, seconds={seconds:.3}",
             if self.met { "met" } else { "not met" },
-            error.value,
-            error.unit
         )
     }
 }
@@ -89,7 +87,7 @@ impl Target {
 
     fn is_met(&self, estimate: &Estimate) -> bool {
         self.max_error
-            .is_none_or(|most| estimate.error.value <= most)
+            .is_none_or(|most| estimate.error.value.is_some_and(|error| error <= most))
             && self.max_seconds.is_none_or(|most| estimate.seconds <= most)
     }
 
@@ -124,10 +122,10 @@ impl Target {
     /// most accurate in time, and where none is in time, the fastest.
     fn best(&self, estimates: Vec<Estimate>) -> Option<Estimate> {
         let faster = |x: &Estimate, y: &Estimate| x.seconds.total_cmp(&y.seconds);
+        let error_of = |e: &Estimate| e.error.value.unwrap_or(f64::INFINITY);
         let finer = |x: &Estimate, y: &Estimate| {
-            x.error
-                .value
-                .total_cmp(&y.error.value)
+            error_of(x)
+                .total_cmp(&error_of(y))
                 .then(x.seconds.total_cmp(&y.seconds))
         };
         let in_time: Vec<Estimate> = (estimates.iter())
@@ -185,6 +183,11 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
                 Profile::reference(),
             ]
         }
+        // Of the formats only textures are rounded.
+        Work::Realise {
+            format: Format::Glb | Format::Paint,
+            ..
+        } => vec![standard],
         Work::Realise { .. } => [Precision::Eight, Precision::F16, Precision::F32]
             .into_iter()
             .map(|precision| Profile {
@@ -216,9 +219,16 @@ fn measure_error(
             let blend = blend_paints(paints, profile, &|_| ())?.blend;
             estimate.error.value = blend_error(&blend).lab;
         }
-        Work::Realise { thing, weights, .. } => {
+        Work::Realise {
+            thing,
+            weights,
+            format,
+            ..
+        } => {
             let paint = choose(thing, weights)?.paint;
-            let writing = writing_error(&paint, &profile.export);
+            let writing = matches!(format, Format::Zip | Format::Json)
+                .then(|| writing_error(&paint, &profile.export))
+                .flatten();
             estimate.error.value = file_error(&error_of(thing, weights), writing.as_ref()).lab;
         }
         // Ingest and preview are compared on the very slices and pixels that the result is compared on.
@@ -243,7 +253,7 @@ mod tests {
             }],
             bytes: 0,
             error: EstimatedError {
-                value: error,
+                value: Some(error),
                 unit: "Lab",
             },
         }

@@ -61,8 +61,8 @@ fn main() -> Outcome<()> {
         row("realisation to bundle bytes", ours, "copying them", copy);
     }
     if wanted("glb") {
-        let bytes = glb(&realised, &about, &settings)?;
-        let ours = cpu(9, || glb(&realised, &about, &settings).map(|b| b.len()));
+        let bytes = glb(&realised, &about)?;
+        let ours = cpu(9, || glb(&realised, &about).map(|b| b.len()));
         let copy = cpu(9, || black_box(black_box(&bytes).clone()).len());
         row("realisation to GLB bytes", ours, "copying them", copy);
     }

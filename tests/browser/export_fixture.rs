@@ -46,10 +46,7 @@ fn main() -> Result<(), Anything> {
             folder.join(format!("{name}.json")),
             material_json(&paint, &about, &settings)?,
         )?;
-        std::fs::write(
-            folder.join(format!("{name}.glb")),
-            glb(&paint, &about, &settings)?,
-        )?;
+        std::fs::write(folder.join(format!("{name}.glb")), glb(&paint, &about)?)?;
         std::fs::write(
             folder.join(format!("{name}_expected.json")),
             serde_json::to_vec(&expected(&paint, tile_of(&paint)))?,

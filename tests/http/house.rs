@@ -163,7 +163,7 @@ impl Works for Pretend {
             stages: Vec::new(),
             bytes: 1000,
             error: EstimatedError {
-                value: 0.25,
+                value: Some(0.25),
                 unit: "Lab",
             },
         })

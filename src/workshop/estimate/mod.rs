@@ -55,16 +55,25 @@ pub struct Stage {
 /// An error to expect.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct EstimatedError {
-    /// How much.
-    pub value: f64,
+    /// How much; null where it is not known, as of a paint that was not clustered here.
+    pub value: Option<f64>,
     /// Of what: `Lab` (misplaced colors of flakes) or `CIEDE2000` (mean over a picture's pixels, by sampling).
     pub unit: &'static str,
 }
 
 impl EstimatedError {
-    fn lab(value: f64) -> Self {
+    fn lab(value: Option<f64>) -> Self {
         let unit = "Lab";
         Self { value, unit }
+    }
+}
+
+impl std::fmt::Display for EstimatedError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.value {
+            Some(value) => write!(f, "{value:.4} {}", self.unit),
+            None => f.write_str("not known"),
+        }
     }
 }
 

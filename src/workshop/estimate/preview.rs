@@ -79,7 +79,7 @@ pub fn estimate_preview(
         });
     }
     let error = EstimatedError {
-        value: error?.mean_delta_e,
+        value: Some(error?.mean_delta_e),
         unit: "CIEDE2000",
     };
     let drawn_with = Profile {

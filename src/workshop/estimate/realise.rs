@@ -45,7 +45,7 @@ pub fn estimate_realise(
     }
     let report = &samples[1].2.report;
     let error = report.pointer("/accuracy/error/lab");
-    let error = error.and_then(serde_json::Value::as_f64).unwrap_or(0.0);
+    let error = error.and_then(serde_json::Value::as_f64);
     Ok(Estimate::new(
         profile,
         stages,

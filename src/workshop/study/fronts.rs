@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::material::clustered;
 use super::{Material, StudyOptions, Tell, WorkshopError, shortest};
 use crate::accuracy::study::{Front, Point};
-use crate::accuracy::{PRESETS, Profile, blend_error, paint_error};
+use crate::accuracy::{PRESETS, Profile, ResultError, blend_error, paint_error};
 use crate::blend::{BlendSettings, RealisationWeights};
 use crate::export::{ExportSettings, Precision};
 use crate::fit::{BoxRule, ClusterSettings};
@@ -119,10 +119,10 @@ pub(super) fn ingest(
         tell("ingest", share(k, count, 0.0, 0.25));
         let source = &material.sources()[0];
         let (seconds, paint) = shortest(goes, all(), || source.fit(&of.profile.flakes))?;
-        let mut worst = paint_error(&paint).lab;
+        let mut worst = measured(paint_error(&paint))?;
         let mut instrument: f64 = 0.0;
         for file in material.fitted(&of.profile.flakes, 2)? {
-            worst = worst.max(paint_error(file).lab);
+            worst = worst.max(measured(paint_error(file))?);
             let error = file.clustering.as_ref().and_then(|c| c.error.as_ref());
             let largest = error.map_or(0.0, |e| e.instrument.iter().copied().fold(0.0, f64::max));
             instrument = instrument.max(largest);
@@ -239,7 +239,7 @@ pub(super) fn blend(
             }
             made => made?,
         };
-        let mut point = point(of, seconds, blend_error(&made.blend).lab);
+        let mut point = point(of, seconds, measured(blend_error(&made.blend))?);
         let report = made.blend.report();
         let gap = report.pairs.iter().map(|p| p.mean_gap).fold(0.0, f64::max);
         point.more.insert("of it transport".to_owned(), gap);
@@ -457,4 +457,10 @@ fn draw(
     };
     let (seconds, rendering) = shortest(goes, all(), go)?;
     Ok((seconds, rendering.film))
+}
+/// The error of what a study clustered itself is known.
+fn measured(error: ResultError) -> Result<f64, WorkshopError> {
+    let unknown =
+        || WorkshopError::internal("a paint of the study was not compared with its pictures");
+    error.lab.ok_or_else(unknown)
 }
