@@ -5,9 +5,20 @@
 //! ```
 //!
 //! What is known by its ratio stays above 0 at any weights, and a flake that never changes does not outweigh all others.
+//! Where the weights sum to nearly nothing the shares `w_m/Σw` have a pole. Below `|Σw| = δ` they pass through the even
+//! mean instead, without a jump:
+//!
+//! ```text
+//! share_m = 1/n + (w_m − Σw/n) Σw / max(Σw², δ²),  δ = 0.1
+//! ```
+//!
+//! which is `w_m/Σw` from δ on.
+
+/// Sum of weights below which the shares turn to the even mean.
+const LEAST_SUM: f64 = 0.1;
 
 /// The mean of positive values; of equal ones themselves, and at weight 1 that paint's own to the bit. Even where the
-/// weights sum to less than 1e-9 in size. In `0..=f64::MAX`.
+/// weights sum to 0. In `0..=f64::MAX`.
 pub(super) fn geometric_mean(values: &(impl Iterator<Item = f64> + Clone), weights: &[f64]) -> f64 {
     let mut others = values.clone();
     if let Some(first) = others.next()
@@ -18,7 +29,13 @@ pub(super) fn geometric_mean(values: &(impl Iterator<Item = f64> + Clone), weigh
     let sum: f64 = weights.iter().sum();
     #[allow(clippy::cast_precision_loss)] // at most five paints
     let even = 1.0 / weights.len() as f64;
-    let share = |w: f64| if sum.abs() < 1e-9 { even } else { w / sum };
+    let share = |w: f64| {
+        if sum.abs() >= LEAST_SUM {
+            w / sum
+        } else {
+            even + (w - sum * even) * sum / (LEAST_SUM * LEAST_SUM)
+        }
+    };
     let pairs = || values.clone().zip(weights);
     let mean = pairs().map(|(x, &w)| x.powf(share(w))).product::<f64>();
     // Far extrapolation can give 0 · ∞; the logarithm's sum still knows which of the two it is.
@@ -51,6 +68,19 @@ mod tests {
         let beyond = mean([1e4, 558.0], [-0.2, 1.2]);
         assert!((beyond - 558.0 * (558.0_f64 / 1e4).powf(0.2)).abs() < 1e-9);
         assert!(mean([20.0, 30.0], [4.0, -3.0]) > 0.0);
+    }
+
+    #[test]
+    fn weights_that_sum_to_nothing_are_passed_without_a_jump() {
+        // The slope of a share is 1/δ + |w|/δ² at most: 210 at weights up to 2, times ln 9 for the mean's logarithm.
+        let at = |sum: f64| mean([1.0, 9.0], [-2.0, 2.0 + sum]).ln();
+        let step = 1e-4;
+        for k in -3000..3000 {
+            let sum = f64::from(k) * step;
+            let moved = (at(sum + step) - at(sum)).abs();
+            assert!(moved <= 2.0 * 210.0 * 9.0_f64.ln() * step, "{sum}: {moved}");
+        }
+        assert_eq!(mean([1.0, 9.0], [-2.0, 2.0]), 3.0);
     }
 
     #[test]

@@ -6,13 +6,11 @@
 
 use super::lab::Lab;
 
-/// CIEDE2000 difference of two colors under the same white, `>= 0`.
+/// CIEDE2000 difference of two colors under the same white, `>= 0`; NaN of a color that is not finite.
 #[must_use]
 pub fn ciede2000(x: Lab, y: Lab) -> f64 {
-    let seventh = |c: f64| {
-        let c7 = c.powi(7);
-        (c7 / (c7 + 25.0_f64.powi(7))).sqrt()
-    };
+    // C⁷/(C⁷ + 25⁷), divided by C⁷, which overflows where the quotient is just 1.
+    let seventh = |c: f64| (1.0 / (1.0 + (25.0 / c).powi(7))).sqrt();
     let g = 0.5 * (1.0 - seventh(f64::midpoint(x.a.hypot(x.b), y.a.hypot(y.b))));
     let (a1, a2) = (x.a * (1.0 + g), y.a * (1.0 + g));
     let (c1, c2) = (a1.hypot(x.b), a2.hypot(y.b));
@@ -54,7 +52,9 @@ pub fn ciede2000(x: Lab, y: Lab) -> f64 {
     let turned = 60.0 * (-((h - 275.0) / 25.0).powi(2)).exp();
     let rt = -2.0 * seventh(c) * turned.to_radians().sin();
     let (l, c, h) = (dl / sl, dc / sc, dh / sh);
-    (l * l + c * c + h * h + rt * c * h).max(0.0).sqrt()
+    let squared = l * l + c * c + h * h + rt * c * h;
+    // Not `max`, which would call NaN a perfect match.
+    if squared < 0.0 { 0.0 } else { squared.sqrt() }
 }
 
 #[cfg(test)]

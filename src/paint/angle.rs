@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Strictly ascending angles in degrees, at least one, within `0..=90`.
+/// Least step of a grid, degrees: far below any instrument's lens, and ten times what single precision tells apart.
+pub const LEAST_STEP_DEG: f64 = 1e-4;
+
+/// Angles in degrees, at least one, within `0..=90`, each at least [`LEAST_STEP_DEG`] above the one before.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct AngleGrid {
@@ -17,15 +20,17 @@ pub enum AngleGridError {
     #[error("an angle grid needs at least one angle")]
     Empty,
     /// An angle outside `0..=90` or not finite.
-    #[error("angle {index} is {value}°, accepted is 0 to 90")]
+    #[error("angle {index} is {value:?}°, accepted is 0 to 90")]
     Range {
         /// Position in the list.
         index: usize,
         /// The offending angle.
         value: f64,
     },
-    /// An angle that is not above the one before it.
-    #[error("angle {index} is {value}° after {before}°, angles must ascend strictly")]
+    /// An angle that is not above the one before it, or by hardly anything.
+    #[error(
+        "angle {index} is {value:?}° after {before:?}°, angles must ascend by {LEAST_STEP_DEG}° at least"
+    )]
     Order {
         /// Position in the list.
         index: usize,
@@ -52,7 +57,8 @@ impl AngleGrid {
     ///
     /// # Errors
     ///
-    /// [`AngleGridError`] for an empty list, an angle outside `0..=90`, or angles that do not ascend strictly.
+    /// [`AngleGridError`] for an empty list, an angle outside `0..=90`, or one that is not [`LEAST_STEP_DEG`] above the
+    /// one before it.
     pub fn new(degrees: Vec<f64>) -> Result<Self, AngleGridError> {
         if degrees.is_empty() {
             return Err(AngleGridError::Empty);
@@ -61,7 +67,8 @@ impl AngleGrid {
             if !(0.0..=90.0).contains(&value) {
                 return Err(AngleGridError::Range { index, value });
             }
-            if index > 0 && value <= degrees[index - 1] {
+            // A decimal step is a rounding away from itself.
+            if index > 0 && value - degrees[index - 1] < LEAST_STEP_DEG * (1.0 - 1e-6) {
                 return Err(AngleGridError::Order {
                     index,
                     value,
@@ -142,12 +149,12 @@ impl AngleGrid {
         }
     }
 
-    /// The angles of both grids, each once.
+    /// The angles of both grids, each once; of two nearer than [`LEAST_STEP_DEG`] the smaller.
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         let mut degrees: Vec<f64> = self.degrees.iter().chain(&other.degrees).copied().collect();
         degrees.sort_by(f64::total_cmp);
-        degrees.dedup();
+        degrees.dedup_by(|above, kept| *above - *kept < LEAST_STEP_DEG);
         Self { degrees }
     }
 }

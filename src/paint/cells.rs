@@ -8,15 +8,15 @@
 //! Numbers are dealt so that a tile keeps the histogram it draws: in random order every cell is given the middle of a
 //! piece of `0..2^32` as long as its area. The cells whose numbers lie in an interval then cover that share of the tile,
 //! not a share that scatters like a dice count, and a tile's mean and sparkle are the slice's as nearly as its cells
-//! can make them. The lowest eight bits say when the cell's flake changes as the paint turns, spread evenly over cells
-//! that follow one another.
+//! can make them. That is the upper half of a number, its rank. The two bytes of the lower half say when the cell's flake
+//! changes as the paint turns about either angle, spread evenly over the pairs of bytes by cells that follow one another.
 //!
 //! Places and order come from 32-bit integer hashing and the tile has no seam; a shader reads it from a texture.
 
 use std::sync::OnceLock;
 
 use super::flakes::FlakeTexture;
-use super::sparkle::{mix, unit};
+use super::sparkle::{RANK, mix, unit};
 
 /// A tile of cell numbers that repeats over the paint.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -100,7 +100,8 @@ impl RandomTexture {
         &self.cells
     }
 
-    /// Number of a texel anywhere on the paint. Every repetition of the tile gets numbers of its own.
+    /// Number of a texel anywhere on the paint. Every repetition of the tile deals its ranks and phases from another
+    /// beginning, so that each is as even as the tile and none looks like it.
     #[must_use]
     pub fn at(&self, x: i32, y: i32) -> u32 {
         let (w, h) = (self.width.cast_signed(), self.height.cast_signed());
@@ -110,10 +111,12 @@ impl RandomTexture {
         if (tile_x, tile_y) == (0, 0) {
             return cell;
         }
-        mix(cell
-            ^ mix(tile_x
-                .cast_unsigned()
-                .wrapping_add(mix(tile_y.cast_unsigned()))))
+        let turn = mix(tile_x
+            .cast_unsigned()
+            .wrapping_add(mix(tile_y.cast_unsigned())));
+        // Each part goes round by itself.
+        let part = |bits: u32| (cell & bits).wrapping_add(turn & bits) & bits;
+        part(RANK) | part(0xff00) | part(0x00ff)
     }
 }
 
@@ -239,14 +242,18 @@ fn deal_numbers(cells: &mut [u32], seed: u32) {
         // The middle of before..before + own, of whole; an area of one texel is at least 2^32 / 2^26 long.
         #[allow(clippy::cast_possible_truncation)] // below 2^32, since the middle is below whole
         let number = (((2 * before + own) << 31) / whole) as u32;
-        // Golden sections spread any run of places evenly.
-        area[index as usize] = number & !0xff | place.wrapping_mul(0x9e37_79b9) >> 24;
+        let phase = |step: u32| place.wrapping_mul(step) >> 24;
+        area[index as usize] = number & RANK | phase(PLASTIC[1]) << 8 | phase(PLASTIC[0]);
         before += own;
     }
     for cell in cells {
         *cell = area[*cell as usize];
     }
 }
+
+/// 2^32 by the plastic number and by its square: their multiples spread any run of places evenly over the unit square
+/// (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
+const PLASTIC: [u32; 2] = [0xc13f_a9a9, 0x91e1_0da6];
 
 /// Spacing of cells, in texels, whose autocorrelation falls to one half at `grain` texels.
 ///

@@ -93,7 +93,25 @@ pub fn fresnel(cos: f64, ior: f64) -> f64 {
 /// Share of light that passes a coat of index `ior` on its way in from `wi` and out towards `wo`, both outside.
 #[must_use]
 pub fn transmission(wi: Direction, wo: Direction, ior: f64) -> f64 {
-    (1.0 - fresnel(wi[2], ior)) * (1.0 - fresnel(wo[2], ior))
+    passed(wi[2], ior) * passed(wo[2], ior)
+}
+
+/// `1 − R` of [`fresnel`] without the difference, which cancels where nearly all is reflected.
+///
+/// ```text
+/// T = (t_s + t_p) / 2,  t_s = 4 c q / (c + q)²,  t_p = 4 n² c q / (n² c + q)²
+/// ```
+fn passed(cos: f64, ior: f64) -> f64 {
+    let excess = (ior - 1.0) * (ior + 1.0);
+    if excess <= 0.0 {
+        return 1.0;
+    }
+    let c = cos.clamp(0.0, 1.0);
+    let n2 = ior * ior;
+    let q = c.hypot(excess.sqrt());
+    let s = 4.0 * c * q / (c + q).powi(2);
+    let p = 4.0 * n2 * c * q / (n2 * c + q).powi(2);
+    f64::midpoint(s, p)
 }
 
 /// Direction inside the coat of a direction outside it; exact for an index of 1.

@@ -144,6 +144,9 @@ pub enum PaintFileError {
         /// What may stand there.
         accepted: &'static str,
     },
+    /// Its energy certificate.
+    #[error("the energy certificate in the .paint file {0}")]
+    Energy(&'static str),
     /// The parameters in it.
     #[error("the .paint file holds no valid paint: {0}")]
     Paint(#[from] PaintError),
@@ -302,6 +305,7 @@ impl PaintFile {
         if let Some(clustering) = &header.clustering {
             clustering.check(limits)?;
         }
+        header.energy.check().map_err(PaintFileError::Energy)?;
         let (coat, diffuse, lobes) = (physical.coat, physical.diffuse, physical.lobes);
         let paint = CarPaint {
             coat,

@@ -5,9 +5,12 @@
 //! after `Δθ` is `1 − Δθ/persistence`, which gives the lifetime. Cell and epochs give the number that picks a cluster by
 //! cumulative probability, and three more by hashing that place the color in its box.
 //!
-//! The pick is not a hash but `cell (1 + 2h)(1 + 2d) + (h + d) c` modulo one: cells whose numbers cover `0..1` evenly
-//! then do so in every epoch, and a tile keeps the histogram of its slice at every angle. With `c = (3 − √3)/6` the picks
-//! of two epochs are uncorrelated, as a flake that went dark says nothing of its successor.
+//! The pick is not a hash but `rank k + (h + d) c` modulo one, where the rank is the upper half of the cell's number and
+//! `k` is 1, 5, 7 or 11 by turns: cells whose ranks cover `0..1` evenly then do so in every epoch, and a tile keeps the
+//! histogram of its slice at every angle. A factor `k` scatters a share like √k cells, so that it has to stay small; two
+//! epochs of other factors `k`, `l` correlate by `1/(k l)` at most, for a flake that went dark says nothing of its
+//! successor. The phases are the bytes of the lower half, evenly spread over cells of neighbouring ranks in both
+//! dimensions, or each epoch would show a random part of the cells and the evenness were gone.
 //!
 //! All of it is 32-bit integer arithmetic, so that a shader draws the very same flakes. The mixing step is
 //! PCG-RXS-M-XS (M. O'Neill, 2014). Hash by the texel on the paint, never by the pixel or the frame.
@@ -42,7 +45,13 @@ pub struct TexelDraw {
     pub place: [f32; 3],
 }
 
-/// 2^32 (3 − √3)/6.
+/// The bits of a cell's number that are its rank among the cells.
+pub(super) const RANK: u32 = 0xffff_0000;
+
+/// Odd, so that they permute the ranks, and without a common factor.
+const EPOCH_FACTORS: [u32; 4] = [1, 5, 7, 11];
+
+/// 2^32 (3 − √3)/6: by itself it takes all correlation from a step.
 const EPOCH_TURN: u32 = 0x3619_62ea;
 
 impl TexelDraw {
@@ -56,21 +65,16 @@ impl TexelDraw {
             whole
         };
         #[allow(clippy::cast_precision_loss)] // eight bits
-        let phase_h = ((cell & 0xff) as f32 + 0.5) / 256.0;
-        let h = epoch(theta_h_deg, persistence_deg[0], phase_h);
-        let d = epoch(
-            theta_d_deg,
-            persistence_deg[1],
-            unit(mix(cell ^ 0x85eb_ca6b)),
-        );
+        let phase = |byte: u32| ((byte & 0xff) as f32 + 0.5) / 256.0;
+        let h = epoch(theta_h_deg, persistence_deg[0], phase(cell));
+        let d = epoch(theta_d_deg, persistence_deg[1], phase(cell >> 8));
         let key = mix(cell ^ mix(h ^ mix(d ^ 0xc2b2_ae35)));
-        let spread = h
-            .wrapping_mul(2)
-            .wrapping_add(1)
-            .wrapping_mul(d.wrapping_mul(2).wrapping_add(1));
-        let turned = cell
-            .wrapping_mul(spread)
-            .wrapping_add(h.wrapping_add(d).wrapping_mul(EPOCH_TURN));
+        let factor = EPOCH_FACTORS[(h.wrapping_add(d.wrapping_mul(2)) & 3) as usize];
+        // What follows the rank's 16 bits is as good as random.
+        let turned = (cell & RANK)
+            .wrapping_mul(factor)
+            .wrapping_add(h.wrapping_add(d).wrapping_mul(EPOCH_TURN))
+            .wrapping_add(key >> 16);
         Self {
             pick: unit(turned),
             place: [
@@ -299,8 +303,9 @@ mod tests {
             pick: unit(u32::MAX),
             place: [unit(u32::MAX); 3],
         };
-        // Epoch 0 of both angles turns nothing: the greatest cell has the greatest number.
-        assert_eq!(TexelDraw::of(u32::MAX, 0.0, 0.0, [90.0; 2]).pick, last.pick);
+        // Epoch 0 of both angles turns nothing: the greatest rank has the greatest number, but for its lower half.
+        let greatest = TexelDraw::of(RANK, 0.0, 0.0, [90.0; 2]).pick;
+        assert!(greatest <= last.pick && greatest >= unit(RANK));
         let [_, y, _] = sampler.draw(0, last);
         assert_eq!(y, expand_f32((90.0 + 16.0) / 116.0));
     }

@@ -203,14 +203,18 @@ int carpaint_floor_div(int a, int b) {
     return a >= 0 ? a / b : -((b - 1 - a) / b);
 }
 
-// Number of the cell under a texel anywhere on the paint. Every repetition of the tile has numbers of its own.
+// Number of the cell under a texel anywhere on the paint. Every repetition of the tile deals its ranks (the upper half)
+// and phases (the two bytes of the lower) from another beginning.
 uint carpaint_cell(ivec2 texel) {
     ivec2 size = textureSize(carpaint_random, 0);
     ivec2 tile = ivec2(carpaint_floor_div(texel.x, size.x), carpaint_floor_div(texel.y, size.y));
     uvec4 bytes = uvec4(texelFetch(carpaint_random, texel - tile * size, 0) * 255.0 + 0.5);
     uint cell = bytes.r | (bytes.g << 8u) | (bytes.b << 16u) | (bytes.a << 24u);
     if (tile == ivec2(0)) return cell;
-    return carpaint_mix(cell ^ carpaint_mix(uint(tile.x) + carpaint_mix(uint(tile.y))));
+    uint turn = carpaint_mix(uint(tile.x) + carpaint_mix(uint(tile.y)));
+    uint rank = (cell & 0xffff0000u) + (turn & 0xffff0000u);
+    uint phase_d = ((cell & 0xff00u) + (turn & 0xff00u)) & 0xff00u;
+    return rank | phase_d | ((cell + turn) & 0xffu);
 }
 
 uint carpaint_epoch(float theta_deg, float persistence_deg, float phase) {
@@ -220,11 +224,13 @@ uint carpaint_epoch(float theta_deg, float persistence_deg, float phase) {
 // The four random numbers of a cell at an angle pair: x picks the cluster, yzw place the color in its box.
 vec4 carpaint_draw(uint cell, float theta_h_deg, float theta_d_deg) {
     uint h = carpaint_epoch(theta_h_deg, carpaint_persistence_deg.x, (float(cell & 255u) + 0.5) / 256.0);
-    uint d = carpaint_epoch(theta_d_deg, carpaint_persistence_deg.y, carpaint_unit(carpaint_mix(cell ^ 0x85ebca6bu)));
+    uint d = carpaint_epoch(theta_d_deg, carpaint_persistence_deg.y, (float((cell >> 8u) & 255u) + 0.5) / 256.0);
     uint key = carpaint_mix(cell ^ carpaint_mix(h ^ carpaint_mix(d ^ 0xc2b2ae35u)));
+    // Small odd factors: ranks that cover 0..1 evenly do so in every epoch.
+    const uint factors[4] = uint[4](1u, 5u, 7u, 11u);
+    uint factor = factors[(h + 2u * d) & 3u];
     return vec4(
-        // Numbers that cover 0..1 evenly do so in every epoch.
-        carpaint_unit(cell * (1u + 2u * h) * (1u + 2u * d) + (h + d) * 0x361962eau),
+        carpaint_unit((cell & 0xffff0000u) * factor + (h + d) * 0x361962eau + (key >> 16u)),
         carpaint_unit(carpaint_mix(key ^ 0x2545f491u)),
         carpaint_unit(carpaint_mix(key ^ 0x51ed270bu)),
         carpaint_unit(carpaint_mix(key ^ 0x7feb352du))

@@ -1,6 +1,7 @@
 //! Tests of `cells`.
 
 use super::*;
+use crate::paint::TexelDraw;
 
 /// Half-fall of the probability that texels some way apart share a cell, over both axes.
 fn grain_of(tiles: &[RandomTexture]) -> f64 {
@@ -58,6 +59,36 @@ fn every_interval_of_numbers_covers_its_share_of_the_tile() {
             );
         }
     }
+}
+
+#[test]
+fn a_tile_keeps_the_shares_of_its_picks_at_every_angle() {
+    // Up to four groups of epochs meet at an angle; in each, a share is cut out of the ranks at k ≤ 11 pairs of ends, and
+    // each end misses by half a cell, of either sign. Cells scattered at random would miss by √(7000 · 0.5 · 0.5) = 42.
+    let tile = RandomTexture::new(256, 256, 3.0, 1);
+    let cell_area = 9.0 / 65_536.0;
+    let mut squares = Vec::new();
+    for (h, d) in [
+        (0.0, 0.0),
+        (4.0, 0.0),
+        (7.0, 11.0),
+        (33.0, 50.0),
+        (61.0, 88.0),
+    ] {
+        for share in [0.01, 0.1, 0.5] {
+            let below = tile
+                .cells()
+                .iter()
+                .filter(|cell| TexelDraw::of(**cell, h, d, [10.0; 2]).pick < share)
+                .count();
+            squares.push(((below as f64 / 65_536.0 - f64::from(share)) / cell_area).powi(2));
+        }
+    }
+    let off = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    assert!(
+        off < 0.5 * (4.0 * 2.0 * 11.0_f64).sqrt() * 1.5,
+        "{off} cells"
+    );
 }
 
 #[test]

@@ -14,10 +14,10 @@ use crate::accuracy::Profile;
 use crate::paint::{CarPaint, PaintFile, Reflectance};
 
 /// One case: what was found, and what it may be at most.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
     /// What was tried.
-    pub case: &'static str,
+    pub case: String,
     /// The worst that was found.
     pub found: f64,
     /// The most that is accepted.
@@ -30,9 +30,9 @@ pub struct Check {
 
 impl Check {
     /// A number that is none never passes.
-    fn at_most(case: &'static str, found: f64, limit: f64, unit: &'static str) -> Self {
+    fn at_most(case: impl Into<String>, found: f64, limit: f64, unit: &'static str) -> Self {
         Self {
-            case,
+            case: case.into(),
             found,
             limit,
             unit,
@@ -41,7 +41,7 @@ impl Check {
     }
 
     /// Things of which there must be none.
-    fn none(case: &'static str, found: usize, unit: &'static str) -> Self {
+    fn none(case: impl Into<String>, found: usize, unit: &'static str) -> Self {
         #[allow(clippy::cast_precision_loss)] // some thousands
         Self::at_most(case, found as f64, 0.0, unit)
     }
@@ -122,7 +122,7 @@ mod tests {
         let failed: Vec<_> = checks
             .iter()
             .filter(|c| !c.passed)
-            .map(|c| c.case)
+            .map(|c| c.case.as_str())
             .collect();
         assert!(
             failed.iter().any(|case| case.starts_with("reflectance")),
