@@ -11,17 +11,14 @@ use moka::future::Cache;
 use serde::Serialize;
 use tokio::sync::{RwLock, watch};
 
-use super::ServiceConfig;
-use super::answer::Keep;
+use super::http::{Keep, Kind, Problem};
 use super::ids;
 use super::metrics::Metrics;
-use super::problem::{Kind, Problem};
-use super::runner::Jobs;
-use super::watchers::Watchers;
-use super::workbench::Workbench;
-use super::works::{Thing, Works};
+use super::resources::documents;
+use super::work::{Jobs, Thing, Watchers, Workbench, Works};
 use crate::blend::Blend;
 use crate::paint::PaintFile;
+use crate::service::ServiceConfig;
 use crate::store::{
     BlendRecord, BlobBytes, Blobs, CachedResult, Catalogue, FolderBlobs, Hash, PaintRecord,
     ResultCache, SqliteCatalogue, StoreError, Visibility,
@@ -246,8 +243,8 @@ impl App {
             let file = PaintFile::from_bytes(&bytes, &limits).map_err(Problem::internal)?;
             let names = vec![file.name.clone()];
             let thing = Thing::Paint(Box::new(file));
-            let links = super::paints::links(&record);
-            let document = super::documents::described(&record.id, works.describe(&thing), links);
+            let links = documents::of_paint(&record);
+            let document = documents::described(&record.id, works.describe(&thing), links);
             let PaintRecord {
                 id,
                 paint: file,
@@ -292,8 +289,8 @@ impl App {
                 .map(|(name, _)| name.to_owned())
                 .collect();
             let thing = Thing::Blend(Box::new(blend));
-            let links = super::blends::links(&id, &paints, &options);
-            let document = super::documents::described(&id, works.describe(&thing), links);
+            let links = documents::of_blend(&id, &paints, &options);
+            let document = documents::described(&id, works.describe(&thing), links);
             Ok(Shelved {
                 id,
                 thing,

@@ -18,14 +18,13 @@ use tower::ServiceBuilder;
 use tower::limit::GlobalConcurrencyLimitLayer;
 
 use super::app::App;
-use super::envelope::envelope;
-use super::extract::JSON_BYTES;
-use super::problem::Problem;
-use super::works::Works;
-use super::{
-    ServiceConfig, accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations,
-    paints, previews, readings, realisations, runner, visibility,
+use super::http::{JSON_BYTES, Problem, envelope};
+use super::resources::{
+    accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations, paints, previews,
+    readings, realisations, visibility,
 };
+use super::work::{Works, runner};
+use crate::service::ServiceConfig;
 use crate::store::StoreError;
 
 /// Why a service did not start, or did not go on.

@@ -9,11 +9,9 @@ use axum::response::{IntoResponse, Response};
 use futures::stream::{self, Stream, StreamExt};
 use tokio::sync::watch;
 
-use super::answer::{Answer, Keep};
-use super::app::App;
-use super::extract::{Address, NoQuery};
-use super::problem::{Problem, ProblemDocument};
-use super::runner::{self, JobDocument};
+use crate::service::app::App;
+use crate::service::http::{Address, Answer, Keep, NoQuery, Problem, ProblemDocument};
+use crate::service::work::{JobDocument, runner};
 
 /// Least time between two events.
 const PACE: Duration = Duration::from_millis(100);

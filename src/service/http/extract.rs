@@ -8,9 +8,9 @@ use axum::http::{StatusCode, header};
 use serde::de::{DeserializeOwned, IgnoredAny};
 use utoipa::{IntoParams, PartialSchema};
 
-use super::app::App;
 use super::problem::{Kind, Place, Problem};
 use super::{accepted, query};
+use crate::service::app::App;
 use crate::workshop;
 
 /// Most bytes of a JSON body; the router holds bodies to it.

@@ -6,7 +6,7 @@ use serde_json::Value;
 use utoipa::openapi::path::ParameterIn;
 use utoipa::{IntoParams, PartialSchema};
 
-use super::docs;
+use crate::service::resources::docs;
 
 /// What the field at a JSON pointer of a body accepts.
 #[must_use]

@@ -11,8 +11,8 @@ use axum::response::{IntoResponse, Response};
 use futures::FutureExt;
 
 use super::answer::{Stages, unless_known};
-use super::app::App;
 use super::problem::{self, Problem};
+use crate::service::app::App;
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
@@ -84,7 +84,7 @@ fn request_id(request: &Request) -> HeaderValue {
         .filter(plain)
         .cloned()
         .unwrap_or_else(|| {
-            HeaderValue::from_str(&super::ids::random("r_"))
+            HeaderValue::from_str(&crate::service::ids::random("r_"))
                 .unwrap_or(HeaderValue::from_static("r_unknown"))
         })
 }

@@ -7,11 +7,9 @@ use axum::extract::State;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-use super::answer::{Answer, Keep};
-use super::app::App;
-use super::extract::{Address, Query};
-use super::problem::{Problem, ProblemDocument};
-use super::works::{Readings, WorkError};
+use crate::service::app::App;
+use crate::service::http::{Address, Answer, Keep, Problem, ProblemDocument, Query};
+use crate::service::work::{Readings, WorkError};
 
 /// Where an instrument looks from.
 #[derive(Debug, Deserialize, IntoParams)]

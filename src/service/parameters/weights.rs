@@ -3,8 +3,8 @@
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-use super::problem::Problem;
 use crate::blend::RealisationWeights;
+use crate::service::http::Problem;
 
 /// Largest magnitude of a weight.
 const MOST: f64 = 1e12;

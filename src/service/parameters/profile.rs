@@ -3,10 +3,10 @@
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
-use super::app::Shelved;
-use super::problem::Problem;
-use super::works::Thing;
 use crate::accuracy::{Knobs, Profile, ProfileError};
+use crate::service::app::Shelved;
+use crate::service::http::Problem;
+use crate::service::work::Thing;
 use crate::workshop::check_clusters;
 
 /// What would be accepted in place of a profile that is none.

@@ -7,16 +7,12 @@ use axum::extract::State;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-use super::answer::{Answer, Keep};
-use super::app::{App, Shelved};
-use super::extract::{Address, Query, QueryOfTwo};
-use super::ids;
-use super::problem::{Problem, ProblemDocument};
-use super::profile::ProfileText;
-use super::targets;
-use super::weights::WeightQuery;
-use super::works::{Asked, Format};
 use crate::blend::RealisationWeights;
+use crate::service::app::{App, Shelved};
+use crate::service::http::{Address, Answer, Keep, Problem, ProblemDocument, Query, QueryOfTwo};
+use crate::service::ids;
+use crate::service::parameters::{ProfileText, WeightQuery, targets};
+use crate::service::work::{Asked, Format};
 
 /// How accurately a file is written.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -27,10 +23,10 @@ pub struct ProfileQuery {
     profile: Option<ProfileText>,
     /// In place of a profile: the cheapest whose error is at most this, Lab.
     #[param(exclusive_minimum = 0.0)]
-    pub(super) max_error: Option<f64>,
+    pub max_error: Option<f64>,
     /// In place of a profile: the most accurate that is done in so many seconds here.
     #[param(exclusive_minimum = 0.0)]
-    pub(super) max_seconds: Option<f64>,
+    pub max_seconds: Option<f64>,
 }
 
 /// A blend at some weights, as a file.
@@ -104,7 +100,9 @@ async fn realise(
             };
             works.pick(&asked, &target)
         });
-        let found = found.await?.map_err(super::works::WorkError::of_query)?;
+        let found = found
+            .await?
+            .map_err(crate::service::work::WorkError::of_query)?;
         profile = *found.profile();
         picked = Some(found);
     }
@@ -130,7 +128,7 @@ async fn realise(
             .bench
             .run(move || works.realise(&thing.thing, weights.as_ref(), format, &profile))
             .await?;
-        let bytes = made.map_err(super::works::WorkError::of_query)?;
+        let bytes = made.map_err(crate::service::work::WorkError::of_query)?;
         counter.increment(1);
         Ok(bytes.into())
     };

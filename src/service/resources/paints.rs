@@ -9,23 +9,21 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use futures::StreamExt;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 use utoipa::IntoParams;
 
-use super::answer::{Answer, Keep};
-use super::app::App;
 use super::documents::{PaintDocument, PaintList, PaintSummary};
-use super::extract::{Address, NoQuery, Query};
-use super::idempotency::Idempotency;
-use super::ids;
-use super::problem::{Kind, Place, Problem, ProblemDocument};
-use super::profile::ProfileText;
-use super::runner::{self, Ended, JobDocument, UnderWay};
-use super::targets;
 use super::visibility::Visibility;
-use super::waiting::Prefer;
-use super::workbench::CalledOff;
-use super::works::{Asked, Format, IngestOrder, Layout, Picked, Target, ThetaHSpacing};
+use crate::service::app::App;
+use crate::service::http::{
+    Address, Answer, Idempotency, Keep, Kind, NoQuery, Place, Prefer, Problem, ProblemDocument,
+    Query,
+};
+use crate::service::ids;
+use crate::service::parameters::{ProfileText, targets};
+use crate::service::work::{
+    Asked, CalledOff, Ended, Format, IngestOrder, JobDocument, Layout, Picked, Target,
+    ThetaHSpacing, UnderWay, runner,
+};
 use crate::store::{BlobWriter, Hash, JobKind, JobRecord, PaintRecord};
 use crate::workshop::NAME_CHARACTERS;
 
@@ -409,7 +407,7 @@ async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Problem> 
 }
 
 /// The job: fits an upload and keeps the paint.
-pub(super) async fn ingest(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Problem> {
+pub async fn ingest(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Problem> {
     let id = &under_way.job().subject;
     if app.catalogue.paint(id).await?.is_some() {
         return Ok(Ok(()));
@@ -428,14 +426,14 @@ pub(super) async fn ingest(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended
     let Ok(fitted) = fitted.await? else {
         return Ok(Err(CalledOff));
     };
-    let file = fitted.map_err(super::works::WorkError::of_upload)?;
+    let file = fitted.map_err(crate::service::work::WorkError::of_upload)?;
     app.metrics.paints_fitted.increment(1);
     under_way.stage("storing");
     app.keep_paint(id, file, Some(upload)).await.map(Ok)
 }
 
 /// Lets go of the upload of a job that came to nothing.
-pub(super) async fn forget_upload(app: &App, job: &JobRecord) -> Result<(), Problem> {
+pub async fn forget_upload(app: &App, job: &JobRecord) -> Result<(), Problem> {
     let request: IngestRequest = serde_json::from_str(&job.request).map_err(Problem::internal)?;
     app.forget_upload(request.upload.hash()?).await
 }
@@ -601,22 +599,4 @@ pub async fn delete(
     }
     app.forget_paint(&id).await?;
     Ok(StatusCode::NO_CONTENT)
-}
-
-/// Addresses of what can be made of a paint.
-pub(super) fn links(record: &PaintRecord) -> Value {
-    let base = format!("/v1/paints/{}", record.id);
-    let measurement = record.measurement.map(|_| format!("{base}/measurement"));
-    json!({
-        "visibility": Visibility::from(record.visibility),
-        "links": {
-            "self": base,
-            "paint": format!("{base}/paint"),
-            "measurement": measurement,
-            "preview": format!("{base}/preview.png"),
-            "bundle": format!("{base}/realisation.zip"),
-            "glb": format!("{base}/realisation.glb"),
-            "readings": format!("{base}/readings"),
-        }
-    })
 }

@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::works::{Fault, WorkError};
+use crate::service::work::{Fault, WorkError};
 use crate::store::StoreError;
 use crate::workshop::accepted;
 

@@ -8,13 +8,13 @@ use axum::http::{HeaderName, Method, header};
 use utoipa::OpenApi;
 use utoipa::openapi::PathItem;
 
-use super::answer::{Answer, Keep};
-use super::extract::Address;
-use super::problem::{Kind, Problem, ProblemDocument};
 use super::{
     accuracy, blend_bundles, blends, documents, estimates, jobs, operations, paints, previews,
-    profile, readings, realisations, runner, visibility, works,
+    readings, realisations, visibility,
 };
+use crate::service::http::{Address, Answer, Keep, Kind, Problem, ProblemDocument};
+use crate::service::parameters::{KnobsDocument, ProfileDocument};
+use crate::service::work::{Format, JobDocument, Layout, Light, Shape, ThetaHSpacing};
 
 /// Only what this service itself serves.
 const POLICY: &str =
@@ -39,8 +39,8 @@ const POLICY: &str =
     ),
     components(schemas(
         documents::PaintDocument, documents::PaintList, documents::PaintSummary, documents::BlendDocument,
-        blends::BlendOrder, profile::ProfileDocument, profile::KnobsDocument, estimates::EstimateOrder, estimates::EstimateDocument, runner::JobDocument, operations::Health, ProblemDocument,
-        works::Layout, works::ThetaHSpacing, works::Format, previews::PreviewFormat, previews::PreviewOrder, works::Light, works::Shape,
+        blends::BlendOrder, ProfileDocument, KnobsDocument, estimates::EstimateOrder, estimates::EstimateDocument, JobDocument, operations::Health, ProblemDocument,
+        Layout, ThetaHSpacing, Format, previews::PreviewFormat, previews::PreviewOrder, Light, Shape,
     )),
     tags(
         (name = "paints", description = "Uploads become paints"),

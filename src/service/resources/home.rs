@@ -2,7 +2,7 @@
 
 use axum::http::{HeaderName, header};
 
-use super::answer::{Answer, Keep};
+use crate::service::http::{Answer, Keep};
 use crate::studio;
 
 /// Only what this service itself serves, pictures the page made of its answers, and its empty icon.

@@ -6,9 +6,8 @@
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::Response;
 
-use super::answer::Answer;
-use super::problem::Problem;
-use super::works::{Picked, Target, WorkError};
+use crate::service::http::{Answer, Problem};
+use crate::service::work::{Picked, Target, WorkError};
 
 const TARGET: HeaderName = HeaderName::from_static("carpaint-target");
 

@@ -4,11 +4,9 @@ use axum::extract::State;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::answer::{Answer, Keep};
-use super::app::App;
 use super::documents::PaintDocument;
-use super::extract::{Address, Json, NoQuery};
-use super::problem::{Problem, ProblemDocument};
+use crate::service::app::App;
+use crate::service::http::{Address, Answer, Json, Keep, NoQuery, Problem, ProblemDocument};
 use crate::store;
 
 /// Whether lists show a paint.

@@ -7,13 +7,11 @@ use axum::extract::State;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-use super::answer::{Answer, Keep};
-use super::app::App;
-use super::extract::{Address, Query};
-use super::ids;
-use super::problem::{Problem, ProblemDocument};
-use super::profile::ProfileText;
-use super::works::WorkError;
+use crate::service::app::App;
+use crate::service::http::{Address, Answer, Keep, Problem, ProblemDocument, Query};
+use crate::service::ids;
+use crate::service::parameters::ProfileText;
+use crate::service::work::WorkError;
 
 /// How accurately a bundle is written.
 #[derive(Debug, Deserialize, IntoParams)]

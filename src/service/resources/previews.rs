@@ -10,18 +10,15 @@ use bytes::Bytes;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-use super::answer::{Answer, Keep};
-use super::app::{App, Shelved};
-use super::extract::{Address, Json, NoQuery, Query, QueryOfTwo};
-use super::idempotency::Idempotency;
-use super::ids;
-use super::problem::{Kind, Place, Problem, ProblemDocument};
-use super::profile::{ProfileDocument, ProfileText};
-use super::targets;
-use super::weights::WeightQuery;
-use super::workbench::call_off;
-use super::works::{Asked, Light, Picked, Picture, PictureFormat, Shape, View};
 use crate::blend::RealisationWeights;
+use crate::service::app::{App, Shelved};
+use crate::service::http::{
+    Address, Answer, Idempotency, Json, Keep, Kind, NoQuery, Place, Problem, ProblemDocument,
+    Query, QueryOfTwo,
+};
+use crate::service::ids;
+use crate::service::parameters::{ProfileDocument, ProfileText, WeightQuery, targets};
+use crate::service::work::{Asked, Light, Picked, Picture, PictureFormat, Shape, View, call_off};
 use crate::store::{CachedResult, Hash};
 
 /// Longest side of a picture.
@@ -147,14 +144,16 @@ impl ViewQuery {
             };
             works.pick(&asked, &target)
         });
-        let found = found.await?.map_err(super::works::WorkError::of_query)?;
+        let found = found
+            .await?
+            .map_err(crate::service::work::WorkError::of_query)?;
         view.samples_per_pixel = found.profile().samples_per_pixel;
         Ok((view, Some(found)))
     }
 }
 
 /// How a request calls what makes a view.
-pub(super) struct Names {
+pub struct Names {
     place: Place,
     samples: &'static str,
     /// The light of a query, or the list that lights stand in.
@@ -167,7 +166,7 @@ impl Names {
         samples: "spp",
         light: "light",
     };
-    pub(super) const BODY: Self = Self {
+    pub const BODY: Self = Self {
         place: Place::Body,
         samples: "samples_per_pixel",
         light: "lights",
@@ -190,7 +189,7 @@ impl Names {
 }
 
 /// A view, with everything in range.
-pub(super) fn view(app: &App, view: View, names: &Names) -> Result<View, Problem> {
+pub fn view(app: &App, view: View, names: &Names) -> Result<View, Problem> {
     let (most, spp) = (app.config.limits.samples, view.samples_per_pixel);
     let [width, height] = view.size;
     let size = format!("{width}x{height}");
@@ -489,7 +488,7 @@ async fn draw(
                     "Nobody waited for this picture any more.",
                 ));
             };
-            let picture = drawn.map_err(super::works::WorkError::of_query)?;
+            let picture = drawn.map_err(crate::service::work::WorkError::of_query)?;
             counter.increment(1);
             Ok(kept_form(&picture))
         };

@@ -7,8 +7,8 @@ use axum::extract::FromRequestParts;
 use axum::http::HeaderName;
 use axum::http::request::Parts;
 
-use super::app::App;
 use super::problem::{Kind, Place, Problem};
+use crate::service::app::App;
 
 const KEY: HeaderName = HeaderName::from_static("idempotency-key");
 

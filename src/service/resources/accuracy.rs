@@ -2,13 +2,11 @@
 
 use axum::extract::State;
 
-use super::answer::{Answer, Keep};
-use super::app::App;
-use super::extract::NoQuery;
-use super::problem::{Problem, ProblemDocument};
+use crate::service::app::App;
+use crate::service::http::{Answer, Keep, NoQuery, Problem, ProblemDocument};
 
 /// The study that ships with the program.
-const SHIPPED: &str = include_str!("../../docs/study/study.json");
+const SHIPPED: &str = include_str!("../../../docs/study/study.json");
 
 /// What accuracy costs: the study of this installation, or the one that was shipped.
 ///

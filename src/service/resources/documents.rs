@@ -6,7 +6,8 @@ use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
 
 use super::visibility::Visibility;
-use crate::store::{CachedResult, Hash};
+use crate::service::app::BlendOptions;
+use crate::store::{CachedResult, Hash, PaintRecord};
 
 /// A paint: everything known about it.
 #[derive(Debug, Serialize, ToSchema)]
@@ -126,4 +127,41 @@ pub fn described(id: &str, description: Value, extra: Value) -> CachedResult {
         hash: Hash::of(&bytes),
         bytes,
     }
+}
+
+/// Addresses of what can be made of a paint.
+pub fn of_paint(record: &PaintRecord) -> Value {
+    let base = format!("/v1/paints/{}", record.id);
+    let measurement = record.measurement.map(|_| format!("{base}/measurement"));
+    json!({
+        "visibility": Visibility::from(record.visibility),
+        "links": {
+            "self": base,
+            "paint": format!("{base}/paint"),
+            "measurement": measurement,
+            "preview": format!("{base}/preview.png"),
+            "bundle": format!("{base}/realisation.zip"),
+            "glb": format!("{base}/realisation.glb"),
+            "readings": format!("{base}/readings"),
+        }
+    })
+}
+
+/// What was asked for, and addresses of what can be made of it.
+pub fn of_blend(id: &str, paints: &[String], options: &BlendOptions) -> Value {
+    let base = format!("/v1/blends/{id}");
+    let weights =
+        vec![(1.0 / f64::from(u32::try_from(paints.len()).unwrap_or(1))).to_string(); paints.len()]
+            .join(",");
+    json!({
+        "request": { "paints": paints, "profile": options.profile.name(), "knobs": options.profile },
+        "links": {
+            "self": base,
+            "paints": paints.iter().map(|paint| format!("/v1/paints/{paint}")).collect::<Vec<_>>(),
+            "preview": format!("{base}/preview.png?weights={weights}"),
+            "bundle": format!("{base}/realisation.zip?weights={weights}"),
+            "slider_bundle": format!("{base}/bundle.zip"),
+            "glb": format!("{base}/realisation.glb?weights={weights}"),
+        }
+    })
 }

@@ -6,24 +6,20 @@ use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 use utoipa::ToSchema;
 
-use super::answer::{Answer, Keep};
-use super::app::{App, BlendOptions, Shelved};
 use super::documents::BlendDocument;
-use super::extract::{Address, Json, NoQuery};
-use super::idempotency::Idempotency;
-use super::ids;
-use super::problem::{Kind, Problem, ProblemDocument};
-use super::profile::{ProfileDocument, ProfileText};
-use super::runner::{self, Ended, JobDocument, UnderWay};
-use super::targets;
-use super::waiting::Prefer;
-use super::workbench::CalledOff;
-use super::works::{Asked, Picked, Target, Thing};
 use crate::accuracy::Profile;
 use crate::paint::PaintFile;
+use crate::service::app::{App, BlendOptions, Shelved};
+use crate::service::http::{
+    Address, Answer, Idempotency, Json, Keep, Kind, NoQuery, Prefer, Problem, ProblemDocument,
+};
+use crate::service::ids;
+use crate::service::parameters::{ProfileDocument, ProfileText, targets};
+use crate::service::work::{
+    Asked, CalledOff, Ended, JobDocument, Picked, Target, Thing, UnderWay, runner,
+};
 use crate::store::{BlendRecord, JobKind};
 use crate::workshop::check_clusters;
 
@@ -170,11 +166,13 @@ async fn pick(app: &App, ids: &[String], target: Target) -> Result<Picked, Probl
         let paints: Vec<&PaintFile> = shelved.iter().filter_map(|p| p.file_of_paint()).collect();
         works.pick(&Asked::Blend { paints: &paints }, &target)
     });
-    picked.await?.map_err(super::works::WorkError::of_body)
+    picked
+        .await?
+        .map_err(crate::service::work::WorkError::of_body)
 }
 
 /// The job: finds the correspondence and keeps the blend.
-pub(super) async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Problem> {
+pub async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Problem> {
     let id = &under_way.job().subject;
     if app.catalogue.blend(id).await?.is_some() {
         return Ok(Ok(()));
@@ -244,7 +242,7 @@ async fn correspond(
             "The job that found this correspondence was cancelled.",
         ));
     };
-    let file = found.map_err(super::works::WorkError::of_body)?;
+    let file = found.map_err(crate::service::work::WorkError::of_body)?;
     app.metrics.blends_computed.increment(1);
     Ok(file)
 }
@@ -266,7 +264,7 @@ fn in_order_of_hashes(asked: &[Arc<Shelved>]) -> (Vec<Arc<Shelved>>, Vec<usize>)
 }
 
 impl Shelved {
-    pub(super) fn file_of_paint(&self) -> Option<&PaintFile> {
+    pub fn file_of_paint(&self) -> Option<&PaintFile> {
         match &self.thing {
             Thing::Paint(file) => Some(file),
             Thing::Blend(_) => None,
@@ -294,23 +292,4 @@ pub async fn show(
         blend.document.clone(),
         Keep::Revalidated,
     ))
-}
-
-/// What was asked for, and addresses of what can be made of it.
-pub(super) fn links(id: &str, paints: &[String], options: &BlendOptions) -> Value {
-    let base = format!("/v1/blends/{id}");
-    let weights =
-        vec![(1.0 / f64::from(u32::try_from(paints.len()).unwrap_or(1))).to_string(); paints.len()]
-            .join(",");
-    json!({
-        "request": { "paints": paints, "profile": options.profile.name(), "knobs": options.profile },
-        "links": {
-            "self": base,
-            "paints": paints.iter().map(|paint| format!("/v1/paints/{paint}")).collect::<Vec<_>>(),
-            "preview": format!("{base}/preview.png?weights={weights}"),
-            "bundle": format!("{base}/realisation.zip?weights={weights}"),
-            "slider_bundle": format!("{base}/bundle.zip"),
-            "glb": format!("{base}/realisation.glb?weights={weights}"),
-        }
-    })
 }

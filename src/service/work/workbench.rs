@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
-use super::problem::Problem;
+use crate::service::http::Problem;
 
 /// Places to compute at.
 #[derive(Clone, Debug)]
@@ -134,7 +134,7 @@ fn words(panic: &(dyn Any + Send)) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::problem::Kind;
+    use crate::service::http::Kind;
     use std::sync::mpsc;
 
     #[tokio::test]

@@ -4,9 +4,8 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::answer::{Answer, Keep};
-use super::app::App;
-use super::problem::{Kind, Problem, ProblemDocument};
+use crate::service::app::App;
+use crate::service::http::{Answer, Keep, Kind, Problem, ProblemDocument};
 
 /// A sign of life.
 #[derive(Debug, Serialize, ToSchema)]

@@ -9,9 +9,9 @@ use axum::http::{HeaderName, StatusCode};
 use axum::response::{IntoResponse, Response};
 
 use super::answer::{Answer, Keep};
-use super::app::App;
 use super::problem::{Kind, Problem};
-use super::runner;
+use crate::service::app::App;
+use crate::service::work::runner;
 use crate::store::{CachedResult, JobState};
 
 /// The `Prefer` header (RFC 7240): `wait=N` seconds, or `respond-async` for none.

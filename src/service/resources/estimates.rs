@@ -7,17 +7,16 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use super::answer::{Answer, Keep};
-use super::app::{App, Shelved};
-use super::extract::{Json, NoQuery};
 use super::previews::{self, Side};
-use super::problem::{Kind, Problem, ProblemDocument};
-use super::profile::{ProfileDocument, ProfileText};
-use super::targets;
-use super::works::{Asked, Estimate, Format, IngestOrder, PictureFormat, Shape, View, WorkError};
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::PaintFile;
+use crate::service::app::{App, Shelved};
+use crate::service::http::{Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument};
+use crate::service::parameters::{ProfileDocument, ProfileText, targets};
+use crate::service::work::{
+    Asked, Estimate, Format, IngestOrder, PictureFormat, Shape, View, WorkError,
+};
 use crate::store::LocalBlob;
 
 /// Work to estimate.

@@ -13,10 +13,11 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::{Semaphore, watch};
 use utoipa::ToSchema;
 
-use super::app::App;
-use super::problem::{Kind, Problem, ProblemDocument};
 use super::workbench::{CalledOff, Workbench, call_off};
-use super::{blends, ids, paints};
+use crate::service::app::App;
+use crate::service::http::{Kind, Problem, ProblemDocument};
+use crate::service::ids;
+use crate::service::resources::{blends, paints};
 use crate::store::{JobKind, JobRecord, JobState, NewJob};
 
 /// How often a job is begun before it is given up: each time the process died over it.
