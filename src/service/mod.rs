@@ -4,10 +4,11 @@
 //! |---|---|
 //! | `serve` | addresses and connections: begin here |
 //! | `http` | what holds for every request: reading it strictly, answers, problems |
-//! | `parameters` | what several resources are asked in the same words: accuracy, targets, weights |
+//! | `parameters` | what several resources are asked in the same words: accuracy, targets, weights, views |
 //! | `resources` | one file per resource: paints, blends, realisations, previews, jobs … |
 //! | `work` | what computes: the workshop, places to compute at, jobs |
 //! | `app` | what all handlers share: the store, the work, the counts |
+//! | `shelf`, `keeping` | paints and blends as they are read, kept and removed |
 //!
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
 //! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`).
@@ -15,11 +16,13 @@
 mod app;
 mod http;
 mod ids;
+mod keeping;
 mod metrics;
 mod parameters;
 mod resources;
 mod samples;
 mod serve;
+mod shelf;
 mod work;
 
 pub use app::App;

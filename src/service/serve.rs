@@ -21,7 +21,7 @@ use super::app::App;
 use super::http::{JSON_BYTES, Problem, envelope};
 use super::resources::{
     accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations, paints, previews,
-    readings, realisations, visibility,
+    readings, realisations, uploads, visibility,
 };
 use super::work::{Works, runner};
 use crate::service::ServiceConfig;
@@ -87,7 +87,7 @@ pub fn router(app: App) -> Router {
 /// What works on paints.
 fn resources() -> Router<App> {
     Router::new()
-        .route("/v1/paints", get(paints::list).post(paints::upload))
+        .route("/v1/paints", get(paints::list).post(uploads::upload))
         .route(
             "/v1/paints/{id}",
             get(paints::show)

@@ -8,7 +8,8 @@ use axum::http::{StatusCode, header};
 use serde::de::{DeserializeOwned, IgnoredAny};
 use utoipa::{IntoParams, PartialSchema};
 
-use super::problem::{Kind, Place, Problem};
+use super::kind::Kind;
+use super::problem::{Place, Problem};
 use super::{accepted, query};
 use crate::service::app::App;
 use crate::workshop;

@@ -7,7 +7,8 @@ use axum::extract::FromRequestParts;
 use axum::http::HeaderName;
 use axum::http::request::Parts;
 
-use super::problem::{Kind, Place, Problem};
+use super::kind::Kind;
+use super::problem::{Place, Problem};
 use crate::service::app::App;
 
 const KEY: HeaderName = HeaderName::from_static("idempotency-key");

@@ -1,7 +1,7 @@
 //! What holds for every request, whatever it is about.
 //!
 //! Each passes the `envelope` (id, time, counts, panics). What it says is read strictly in `extract` and `query`, and
-//! what it prefers in `waiting` and `idempotency`; what is wrong with it becomes a problem in `problem`, which says what
+//! what it prefers in `waiting` and `idempotency`, and an upload comes in through `receiving`; what is wrong with it becomes a problem in `problem`, which says what
 //! is `accepted` instead, and all else an `answer` with an `ETag` and how long it keeps.
 //!
 //! Promised: unknown fields and parameters are refused; nothing internal leaves in an error. Left to others: what a
@@ -12,13 +12,16 @@ mod answer;
 mod envelope;
 mod extract;
 mod idempotency;
+mod kind;
 mod problem;
 mod query;
+pub mod receiving;
 mod waiting;
 
 pub use answer::{Answer, Keep};
 pub use envelope::envelope;
 pub use extract::{Address, JSON_BYTES, Json, NoQuery, Query, QueryOfTwo};
 pub use idempotency::Idempotency;
-pub use problem::{Kind, Place, Problem, ProblemDocument};
+pub use kind::Kind;
+pub use problem::{Place, Problem, ProblemDocument};
 pub use waiting::Prefer;

@@ -3,95 +3,22 @@
 //! Unknown and repeated parameters are refused, so that a typing error is not an answer to another question. Numbers are
 //! finite, lists are separated by commas.
 
-use std::cell::Cell;
-use std::fmt::{self, Display};
+mod refusal;
+mod text;
 
-use serde::de::value::{MapAccessDeserializer, SeqDeserializer, StrDeserializer};
+use std::cell::Cell;
+
+use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, DeserializeOwned, DeserializeSeed, IntoDeserializer, MapAccess, Visitor};
 use serde::forward_to_deserialize_any;
 
-use super::problem::{Kind, Problem};
-use crate::workshop::accepted;
-
-/// What is accepted where nothing says more.
-const ANY_NUMBER: &str = "a finite number";
-const ANY_WHOLE: &str = "a whole number in range";
+use self::refusal::Refusal;
+use self::text::Text;
+use super::kind::Kind;
+use super::problem::Problem;
 
 /// A parameter as it stands in the address, decoded.
 pub type Pair = (String, String);
-
-/// What a field of a struct made of the query refuses.
-#[derive(Debug)]
-struct Refusal {
-    name: Option<String>,
-    message: String,
-    accepted: Option<String>,
-}
-
-impl Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.message)
-    }
-}
-
-impl std::error::Error for Refusal {}
-
-impl de::Error for Refusal {
-    fn custom<T: Display>(message: T) -> Self {
-        let message = message.to_string();
-        let accepted = accepted(&message).map(str::to_owned);
-        Self {
-            name: None,
-            message,
-            accepted,
-        }
-    }
-
-    fn missing_field(field: &'static str) -> Self {
-        Self {
-            name: Some(field.to_owned()),
-            message: format!("The parameter {field} is missing."),
-            accepted: None,
-        }
-    }
-
-    fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
-        let message = format!("{variant:?} is not offered.");
-        Self {
-            name: None,
-            message,
-            accepted: Some(expected.join(", ")),
-        }
-    }
-}
-
-impl Refusal {
-    fn of(self, name: &str) -> Self {
-        Self {
-            name: Some(self.name.unwrap_or_else(|| name.to_owned())),
-            ..self
-        }
-    }
-
-    /// With what would be accepted in place of a value of another type.
-    fn documented(mut self, documented: impl FnOnce(&str) -> Option<String>) -> Self {
-        if let (Some(ANY_NUMBER | ANY_WHOLE), Some(name)) = (self.accepted.as_deref(), &self.name) {
-            self.accepted = documented(name).or(self.accepted);
-        }
-        self
-    }
-
-    fn problem(self) -> Problem {
-        let problem = match &self.name {
-            Some(name) => Problem::parameter(name, self.message),
-            None => Problem::new(Kind::InvalidParameter, self.message),
-        };
-        match self.accepted {
-            Some(accepted) => problem.accepting(accepted),
-            None => problem,
-        }
-    }
-}
 
 /// Splits and decodes a query. Repeated parameters are refused.
 pub fn pairs(query: &str) -> Result<Vec<Pair>, Problem> {
@@ -226,114 +153,6 @@ impl<'de> de::Deserializer<'de> for Asking<'_> {
     forward_to_deserialize_any! {
         bool i8 i16 i32 i64 u8 u16 u32 u64 f32 f64 char str string bytes byte_buf option unit unit_struct
         newtype_struct seq tuple tuple_struct map enum identifier ignored_any
-    }
-}
-
-/// The value of one parameter.
-#[derive(Clone, Copy)]
-struct Text<'a> {
-    name: &'a str,
-    text: &'a str,
-}
-
-impl IntoDeserializer<'_, Refusal> for Text<'_> {
-    type Deserializer = Self;
-
-    fn into_deserializer(self) -> Self {
-        self
-    }
-}
-
-impl Text<'_> {
-    fn refuse(&self, accepted: &str) -> Refusal {
-        let message = format!("{} is {:?}.", self.name, self.text);
-        Refusal {
-            name: Some(self.name.to_owned()),
-            message,
-            accepted: Some(accepted.to_owned()),
-        }
-    }
-
-    fn number<T: std::str::FromStr>(&self, accepted: &str) -> Result<T, Refusal> {
-        self.text.trim().parse().map_err(|_| self.refuse(accepted))
-    }
-}
-
-macro_rules! whole_numbers {
-    ($($method:ident $visit:ident)*) => {$(
-        fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-            visitor.$visit(self.number(ANY_WHOLE)?)
-        }
-    )*};
-}
-
-impl<'de> de::Deserializer<'de> for Text<'_> {
-    type Error = Refusal;
-
-    whole_numbers! {
-        deserialize_u8 visit_u8 deserialize_u16 visit_u16 deserialize_u32 visit_u32 deserialize_u64 visit_u64
-        deserialize_i8 visit_i8 deserialize_i16 visit_i16 deserialize_i32 visit_i32 deserialize_i64 visit_i64
-    }
-
-    fn deserialize_f32<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        self.deserialize_f64(visitor)
-    }
-
-    fn deserialize_f64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        let value: f64 = self.number(ANY_NUMBER)?;
-        if !value.is_finite() {
-            return Err(self.refuse(ANY_NUMBER));
-        }
-        visitor.visit_f64(value)
-    }
-
-    fn deserialize_bool<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        match self.text {
-            "true" => visitor.visit_bool(true),
-            "false" => visitor.visit_bool(false),
-            _ => Err(self.refuse("true or false")),
-        }
-    }
-
-    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        visitor.visit_some(self)
-    }
-
-    fn deserialize_newtype_struct<V: Visitor<'de>>(
-        self,
-        _: &'static str,
-        visitor: V,
-    ) -> Result<V::Value, Refusal> {
-        visitor.visit_newtype_struct(self)
-    }
-
-    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        let parts = self.text.split(',').map(|text| Text {
-            name: self.name,
-            text,
-        });
-        visitor.visit_seq(SeqDeserializer::new(parts))
-    }
-
-    fn deserialize_enum<V: Visitor<'de>>(
-        self,
-        _: &'static str,
-        _: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, Refusal> {
-        let variant: StrDeserializer<'_, Refusal> = self.text.into_deserializer();
-        visitor.visit_enum(variant).map_err(|refusal| Refusal {
-            message: format!("{} is {:?}.", self.name, self.text),
-            ..refusal
-        })
-    }
-
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        visitor.visit_str(self.text)
-    }
-
-    forward_to_deserialize_any! {
-        char str string bytes byte_buf unit unit_struct tuple tuple_struct map struct identifier ignored_any
     }
 }
 

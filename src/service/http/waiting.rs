@@ -9,7 +9,8 @@ use axum::http::{HeaderName, StatusCode};
 use axum::response::{IntoResponse, Response};
 
 use super::answer::{Answer, Keep};
-use super::problem::{Kind, Problem};
+use super::kind::Kind;
+use super::problem::Problem;
 use crate::service::app::App;
 use crate::service::work::runner;
 use crate::store::{CachedResult, JobState};

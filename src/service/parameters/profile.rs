@@ -4,8 +4,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use crate::accuracy::{Knobs, Profile, ProfileError};
-use crate::service::app::Shelved;
 use crate::service::http::Problem;
+use crate::service::shelf::Shelved;
 use crate::service::work::Thing;
 use crate::workshop::check_clusters;
 

@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
 
 use super::visibility::Visibility;
-use crate::service::app::BlendOptions;
+use crate::service::work::BlendOptions;
 use crate::store::{CachedResult, Hash, PaintRecord};
 
 /// A paint: everything known about it.

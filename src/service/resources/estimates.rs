@@ -7,13 +7,14 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use super::previews::{self, Side};
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::PaintFile;
-use crate::service::app::{App, Shelved};
+use crate::service::app::App;
 use crate::service::http::{Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument};
+use crate::service::parameters::view::{self, Side};
 use crate::service::parameters::{ProfileDocument, ProfileText, targets};
+use crate::service::shelf::Shelved;
 use crate::service::work::{
     Asked, Estimate, Format, IngestOrder, PictureFormat, Shape, View, WorkError,
 };
@@ -117,7 +118,7 @@ pub async fn create(
     let profile = order.profile.clone().unwrap_or_default().of_body()?;
     order.refuse_beside_the_point()?;
     if let WorkName::Preview = order.work {
-        previews::view(&app, order.view(&profile), &previews::Names::BODY)?;
+        view::view(&app, order.view(&profile), &view::Names::BODY)?;
     }
     let needed = order.needed(&app).await?;
     let works = Arc::clone(&app.works);

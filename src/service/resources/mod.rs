@@ -16,4 +16,5 @@ pub mod paints;
 pub mod previews;
 pub mod readings;
 pub mod realisations;
+pub mod uploads;
 pub mod visibility;

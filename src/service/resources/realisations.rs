@@ -8,10 +8,11 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::blend::RealisationWeights;
-use crate::service::app::{App, Shelved};
+use crate::service::app::App;
 use crate::service::http::{Address, Answer, Keep, Problem, ProblemDocument, Query, QueryOfTwo};
 use crate::service::ids;
 use crate::service::parameters::{ProfileText, WeightQuery, targets};
+use crate::service::shelf::Shelved;
 use crate::service::work::{Asked, Format};
 
 /// How accurately a file is written.

@@ -6,18 +6,19 @@
 use std::collections::HashMap;
 use std::panic::AssertUnwindSafe;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use futures::FutureExt;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use tokio::sync::{Semaphore, watch};
-use utoipa::ToSchema;
 
-use super::workbench::{CalledOff, Workbench, call_off};
+use super::job_document::JobDocument;
+use super::under_way::UnderWay;
+use super::workbench::{CalledOff, Workbench};
+use super::{blending, ingesting};
 use crate::service::app::App;
-use crate::service::http::{Kind, Problem, ProblemDocument};
+use crate::service::http::{Kind, Problem};
 use crate::service::ids;
-use crate::service::resources::{blends, paints};
 use crate::store::{JobKind, JobRecord, JobState, NewJob};
 
 /// How often a job is begun before it is given up: each time the process died over it.
@@ -26,51 +27,14 @@ const MOST_ATTEMPTS: u32 = 10;
 /// Ended jobs that can still be asked for.
 const JOBS_KEPT: u32 = 10_000;
 
-/// A job as it is told.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
-pub struct JobDocument {
-    /// Address: `j_` and 32 hexadecimal digits.
-    #[schema(pattern = "^j_[0-9a-f]{32}$")]
-    pub id: String,
-    /// What it makes: `ingest` a paint, `blend` a blend.
-    #[schema(value_type = String)]
-    pub kind: JobKind,
-    /// `queued`, `running`, `done`, `failed` or `cancelled`.
-    #[schema(value_type = String)]
-    pub state: JobState,
-    /// Share done.
-    #[schema(minimum = 0.0, maximum = 1.0)]
-    pub progress: f32,
-    /// What is being done.
-    pub stage: String,
-    /// Seconds left as far as one can tell, while it runs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub seconds_left: Option<f32>,
-    /// Address of what was made, when done.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(format = "uri-reference")]
-    pub result: Option<String>,
-    /// Why it failed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub problem: Option<ProblemDocument>,
-}
-
 /// Jobs under way.
 #[derive(Debug)]
 pub struct Jobs {
     lanes: Arc<Semaphore>,
-    bench: Workbench,
+    pub(super) bench: Workbench,
     under_way: Mutex<HashMap<String, Arc<UnderWay>>>,
     submitting: tokio::sync::Mutex<()>,
     most: usize,
-}
-
-/// A job that is queued or running in this process.
-#[derive(Debug)]
-pub struct UnderWay {
-    job: JobRecord,
-    told: watch::Sender<JobDocument>,
-    cancelled: watch::Sender<bool>,
 }
 
 /// How a job ended that did not fail.
@@ -185,7 +149,7 @@ pub async fn resume(app: &App) -> Result<(), Problem> {
 
 fn start(app: &App, job: JobRecord) {
     let under_way = Arc::new(UnderWay {
-        told: watch::Sender::new(document(&job)),
+        told: watch::Sender::new(JobDocument::of(&job)),
         cancelled: watch::Sender::new(false),
         job,
     });
@@ -221,7 +185,11 @@ async fn run(app: App, under_way: Arc<UnderWay>) {
 async fn ended_badly(app: &App, job: &JobRecord, problem: Problem) -> Option<JobDocument> {
     match end(app, job, JobState::Failed, Some(&problem)).await {
         Ok(document) => Some(document),
-        Err(_) => Some(told(job, JobState::Failed, Some(problem.document(None)))),
+        Err(_) => Some(JobDocument::at_end(
+            job,
+            JobState::Failed,
+            Some(problem.document(None)),
+        )),
     }
 }
 
@@ -241,8 +209,8 @@ async fn run_to_end(app: &App, under_way: &Arc<UnderWay>) -> Result<Option<JobDo
         .told
         .send_modify(|told| told.state = JobState::Running);
     let ended = match job.kind {
-        JobKind::Ingest => paints::ingest(app, under_way).await?,
-        JobKind::Blend => blends::blend(app, under_way).await?,
+        JobKind::Ingest => ingesting::ingest(app, under_way).await?,
+        JobKind::Blend => blending::blend(app, under_way).await?,
     };
     match ended {
         Ok(()) => end(app, job, JobState::Done, None).await.map(Some),
@@ -275,48 +243,9 @@ async fn end(
         .await?;
     app.catalogue.forget_ended_jobs(JOBS_KEPT).await?;
     if job.kind == JobKind::Ingest && state != JobState::Done {
-        paints::forget_upload(app, job).await?;
+        ingesting::forget_upload(app, job).await?;
     }
-    Ok(told(job, state, problem))
-}
-
-fn told(job: &JobRecord, state: JobState, problem: Option<ProblemDocument>) -> JobDocument {
-    document(&JobRecord {
-        state,
-        problem: problem.and_then(|problem| serde_json::to_string(&problem).ok()),
-        ..job.clone()
-    })
-}
-
-/// A job on record as it is told.
-fn document(job: &JobRecord) -> JobDocument {
-    let done = job.state == JobState::Done;
-    let made = match job.kind {
-        JobKind::Ingest => "/v1/paints/",
-        JobKind::Blend => "/v1/blends/",
-    };
-    JobDocument {
-        id: job.id.clone(),
-        kind: job.kind,
-        state: if job.state.is_final() {
-            job.state
-        } else {
-            JobState::Queued
-        },
-        progress: if done { 1.0 } else { 0.0 },
-        stage: if job.state.is_final() {
-            job.state.word()
-        } else {
-            "waiting"
-        }
-        .to_owned(),
-        seconds_left: None,
-        result: done.then(|| format!("{made}{}", job.subject)),
-        problem: job
-            .problem
-            .as_deref()
-            .and_then(|problem| serde_json::from_str(problem).ok()),
-    }
+    Ok(JobDocument::at_end(job, state, problem))
 }
 
 /// How a job stands.
@@ -333,7 +262,7 @@ pub async fn look_up(app: &App, id: &str) -> Result<JobDocument, Problem> {
             .accepting("the address in a 202's Location")
     };
     let job = app.catalogue.job(id).await?.ok_or_else(unknown)?;
-    Ok(document(&job))
+    Ok(JobDocument::of(&job))
 }
 
 /// How a job stands once it has ended, or when the time is up or the service goes down.
@@ -382,80 +311,5 @@ pub async fn cancel(app: &App, id: &str) -> Result<JobDocument, Problem> {
             Err(Problem::new(Kind::JobEnded, detail).accepting("jobs that are queued or running"))
         }
         _ => Ok(job),
-    }
-}
-
-impl UnderWay {
-    /// What it is about.
-    #[must_use]
-    pub const fn job(&self) -> &JobRecord {
-        &self.job
-    }
-
-    /// The request it was recorded with.
-    ///
-    /// # Errors
-    ///
-    /// [`Problem`] when the record does not read back.
-    pub fn request<T: for<'de> Deserialize<'de>>(&self) -> Result<T, Problem> {
-        serde_json::from_str(&self.job.request).map_err(Problem::internal)
-    }
-
-    /// Says what is being done now.
-    pub fn stage(&self, stage: &str) {
-        self.told
-            .send_modify(|told| stage.clone_into(&mut told.stage));
-    }
-
-    /// Whether somebody called the job off.
-    #[must_use]
-    pub fn is_cancelled(&self) -> bool {
-        *self.cancelled.borrow()
-    }
-
-    /// Returns once somebody called the job off.
-    pub async fn called_off(&self) {
-        let _ = self
-            .cancelled
-            .subscribe()
-            .wait_for(|&cancelled| cancelled)
-            .await;
-    }
-
-    /// Computes one stage of the job. The work hears of a call through its progress.
-    ///
-    /// # Errors
-    ///
-    /// [`Problem`] when the work panicked.
-    pub async fn compute<T: Send + 'static>(
-        self: &Arc<Self>,
-        app: &App,
-        stage: &str,
-        work: impl FnOnce(&(dyn Fn(f32) + Sync)) -> T + Send + 'static,
-    ) -> Result<Result<T, CalledOff>, Problem> {
-        self.stage(stage);
-        let (this, on, begun) = (Arc::clone(self), app.clone(), Instant::now());
-        let progress = move |share: f32| {
-            if on.is_stopping() || this.is_cancelled() {
-                call_off();
-            }
-            this.tell(share.clamp(0.0, 1.0), begun.elapsed());
-        };
-        app.jobs
-            .bench
-            .run_or_call_off(move || work(&progress))
-            .await
-    }
-
-    /// Tells the share done, in steps that are worth a message.
-    fn tell(&self, share: f32, time: Duration) {
-        self.told.send_if_modified(|told| {
-            if (share - told.progress).abs() < 1e-3 {
-                return false;
-            }
-            told.progress = share;
-            told.seconds_left = (share > 0.02).then(|| time.as_secs_f32() * (1.0 - share) / share);
-            true
-        });
     }
 }

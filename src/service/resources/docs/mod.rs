@@ -10,7 +10,7 @@ use utoipa::openapi::PathItem;
 
 use super::{
     accuracy, blend_bundles, blends, documents, estimates, jobs, operations, paints, previews,
-    readings, realisations, visibility,
+    readings, realisations, uploads, visibility,
 };
 use crate::service::http::{Address, Answer, Keep, Kind, Problem, ProblemDocument};
 use crate::service::parameters::{KnobsDocument, ProfileDocument};
@@ -29,7 +29,7 @@ const POLICY: &str =
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     paths(
-        paints::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete, visibility::change,
+        uploads::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete, visibility::change,
         blends::create, blends::show, blend_bundles::bundle,
         readings::show, readings::table, realisations::of_blend, realisations::of_paint,
         previews::of_blend, previews::of_paint, previews::create,
