@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 
 use super::app::App;
-use super::http::{Keep, Kind, Problem};
+use super::http::{Answer, Keep, Kind, Problem};
 use super::ids;
 use super::resources::documents;
 use super::work::{BlendOptions, Thing};
@@ -35,6 +35,13 @@ pub struct Shelved {
 }
 
 impl Shelved {
+    /// The answer that tells what is known about it.
+    #[must_use]
+    pub fn told(&self) -> Answer {
+        let document = self.document.clone();
+        Answer::result("application/json", document, Keep::Revalidated)
+    }
+
     /// How long files and pictures of it may be kept: what is private, by who asked for it.
     #[must_use]
     pub fn keep(&self) -> Keep {

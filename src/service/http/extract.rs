@@ -200,6 +200,13 @@ fn pointer(path: &serde_path_to_error::Path) -> String {
         .collect()
 }
 
+/// The parameters of a query, none of which has another name than these.
+fn known_pairs(parts: &Parts, names: &[&str]) -> Result<Vec<query::Pair>, Problem> {
+    let pairs = query::pairs(parts.uri.query().unwrap_or(""))?;
+    query::refuse_unknown(&pairs, names)?;
+    Ok(pairs)
+}
+
 fn read_query<T: DeserializeOwned + IntoParams>(pairs: &[query::Pair]) -> Result<T, Problem> {
     query::read(pairs, accepted::in_query::<T>)
 }
@@ -208,9 +215,7 @@ impl<S: Send + Sync, T: DeserializeOwned + IntoParams> FromRequestParts<S> for Q
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
-        let pairs = query::pairs(parts.uri.query().unwrap_or(""))?;
-        query::refuse_unknown(&pairs, query::names::<T>())?;
-        read_query(&pairs).map(Self)
+        read_query(&known_pairs(parts, query::names::<T>())?).map(Self)
     }
 }
 
@@ -223,8 +228,8 @@ where
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
-        let pairs = query::pairs(parts.uri.query().unwrap_or(""))?;
-        query::refuse_unknown(&pairs, &[query::names::<A>(), query::names::<B>()].concat())?;
+        let names = [query::names::<A>(), query::names::<B>()].concat();
+        let pairs = known_pairs(parts, &names)?;
         Ok(Self(read_query(&pairs)?, read_query(&pairs)?))
     }
 }
@@ -233,7 +238,7 @@ impl<S: Send + Sync> FromRequestParts<S> for NoQuery {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
-        query::refuse_unknown(&query::pairs(parts.uri.query().unwrap_or(""))?, &[]).map(|()| Self)
+        known_pairs(parts, &[]).map(|_| Self)
     }
 }
 

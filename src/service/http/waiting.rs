@@ -13,7 +13,7 @@ use super::kind::Kind;
 use super::problem::Problem;
 use crate::service::app::App;
 use crate::service::work::runner;
-use crate::store::{CachedResult, JobState};
+use crate::store::JobState;
 
 /// The `Prefer` header (RFC 7240): `wait=N` seconds, or `respond-async` for none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,15 +76,13 @@ impl Prefer {
         made: impl FnOnce() -> F,
     ) -> Result<Response, Problem>
     where
-        F: Future<Output = Result<CachedResult, Problem>>,
+        F: Future<Output = Result<Answer, Problem>>,
     {
         let begun = Instant::now();
         let job = runner::wait_for(app, job, self.wait.unwrap_or(UNASKED)).await?;
         let waited = begun.elapsed();
         let answer = match job.state {
-            JobState::Done => Answer::result("application/json", made().await?, Keep::Revalidated)
-                .status(StatusCode::CREATED)
-                .location(address),
+            JobState::Done => made().await?.status(StatusCode::CREATED).location(address),
             JobState::Failed => {
                 let told = job.problem.map(Problem::of_document);
                 return Err(told.unwrap_or_else(|| {

@@ -3,7 +3,7 @@
 use axum::extract::State;
 
 use crate::service::app::App;
-use crate::service::http::{Answer, Keep, NoQuery, Problem, ProblemDocument};
+use crate::service::http::{Answer, Keep, NoQuery, Problem, Problems};
 
 /// The study that ships with the program.
 const SHIPPED: &str = include_str!("../../../docs/study/study.json");
@@ -15,7 +15,7 @@ const SHIPPED: &str = include_str!("../../../docs/study/study.json");
     get, operation_id = "show_accuracy", path = "/v1/accuracy", tag = "accuracy",
     responses(
         (status = 200, description = "The study: error against time for blending, realising and previewing, growth, presets", body = Object),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
     )
 )]
 pub async fn show(State(app): State<App>, _: NoQuery) -> Result<Answer, Problem> {

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::service::app::App;
-use crate::service::http::{Address, Answer, Keep, Problem, ProblemDocument, Query};
+use crate::service::http::{Address, Answer, BlendProblems, Keep, Problem, Query};
 use crate::service::ids;
 use crate::service::parameters::ProfileText;
 use crate::service::work::WorkError;
@@ -32,8 +32,7 @@ pub struct BundleQuery {
     params(("id" = String, Path, description = "Blend"), BundleQuery),
     responses(
         (status = 200, description = "The archive", content((Vec<u8> = "application/zip"))),
-        (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        BlendProblems,
     )
 )]
 pub async fn bundle(

@@ -3,15 +3,17 @@
 use std::sync::Arc;
 
 use axum::extract::State;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::documents::BlendDocument;
+use super::making;
 use crate::paint::PaintFile;
 use crate::service::app::App;
 use crate::service::http::{
-    Address, Answer, Idempotency, Json, Keep, NoQuery, Prefer, Problem, ProblemDocument,
+    Address, Answer, BlendProblems, Idempotency, Json, NoQuery, Prefer, Problem, ProblemDocument,
+    Problems,
 };
 use crate::service::ids;
 use crate::service::parameters::{ProfileDocument, ProfileText, targets};
@@ -55,7 +57,7 @@ pub struct BlendOrder {
         (status = 201, description = "The blend", body = BlendDocument, headers(("Location" = String, description = "Its address"))),
         (status = 202, description = "The job that makes it", body = JobDocument, headers(("Location" = String, description = "The job's address"))),
         (status = 422, description = "Too few or too many paints, or unknown ones", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
     )
 )]
 pub async fn create(
@@ -101,20 +103,17 @@ pub async fn create(
     };
     let id = ids::made_of("b_", &(&order.paints, profile));
     let address = format!("/v1/blends/{id}");
-    if app.catalogue.blend(&id).await?.is_some() {
-        let known = app.blend(&id).await?.document.clone();
-        let answer = Answer::result("application/json", known, Keep::Revalidated);
-        let answer = answer.location(&address).picked(picked.as_ref());
-        return Ok(answer.into_response());
-    }
-    let request = BlendRequest {
-        paints: order.paints,
-        profile,
+    let job = if app.catalogue.blend(&id).await?.is_some() {
+        None
+    } else {
+        let request = BlendRequest {
+            paints: order.paints,
+            profile,
+        };
+        Some(runner::submit(&app, JobKind::Blend, &id, &request).await?)
     };
-    let job = runner::submit(&app, JobKind::Blend, &id, &request).await?;
-    let made = || async { Ok(app.blend(&id).await?.document.clone()) };
-    let answer = prefer.answer(&app, &job, &address, made).await?;
-    Ok(targets::told(answer, picked.as_ref()))
+    let made = || app.blend(&id);
+    making::answer(&app, prefer, job, &address, picked.as_ref(), made).await
 }
 
 /// Refuses paints that were clustered otherwise than asked for: paints are clustered when they are uploaded.
@@ -163,8 +162,7 @@ async fn pick(app: &App, ids: &[String], target: Target) -> Result<Picked, Probl
     get, operation_id = "show_blend", path = "/v1/blends/{id}", tag = "blends", params(("id" = String, Path, description = "Blend")),
     responses(
         (status = 200, description = "The blend", body = BlendDocument),
-        (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        BlendProblems,
     )
 )]
 pub async fn show(
@@ -172,10 +170,5 @@ pub async fn show(
     Address(id): Address<String>,
     _: NoQuery,
 ) -> Result<Answer, Problem> {
-    let blend = app.blend(&id).await?;
-    Ok(Answer::result(
-        "application/json",
-        blend.document.clone(),
-        Keep::Revalidated,
-    ))
+    Ok(app.blend(&id).await?.told())
 }

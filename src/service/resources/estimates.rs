@@ -11,7 +11,7 @@ use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::PaintFile;
 use crate::service::app::App;
-use crate::service::http::{Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument};
+use crate::service::http::{Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument, Problems};
 use crate::service::parameters::view::{self, Side};
 use crate::service::parameters::{ProfileDocument, ProfileText, targets};
 use crate::service::shelf::Shelved;
@@ -106,7 +106,7 @@ enum Needed {
     responses(
         (status = 200, description = "Seconds, bytes and error", body = EstimateDocument),
         (status = 422, description = "Work that would be refused", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
     )
 )]
 pub async fn create(

@@ -10,7 +10,7 @@ use futures::stream::{self, Stream, StreamExt};
 use tokio::sync::watch;
 
 use crate::service::app::App;
-use crate::service::http::{Address, Answer, Keep, NoQuery, Problem, ProblemDocument};
+use crate::service::http::{Address, Answer, JobProblems, Keep, NoQuery, Problem, ProblemDocument};
 use crate::service::work::{JobDocument, runner};
 
 /// Least time between two events.
@@ -21,8 +21,7 @@ const PACE: Duration = Duration::from_millis(100);
     get, operation_id = "show_job", path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "Job")),
     responses(
         (status = 200, description = "The job", body = JobDocument),
-        (status = 404, description = "There is no such job", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        JobProblems,
     )
 )]
 pub async fn show(
@@ -44,8 +43,7 @@ pub async fn show(
     get, operation_id = "job_events", path = "/v1/jobs/{id}/events", tag = "jobs", params(("id" = String, Path, description = "Job")),
     responses(
         (status = 200, description = "The events", body = String, content_type = "text/event-stream"),
-        (status = 404, description = "There is no such job", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        JobProblems,
     )
 )]
 pub async fn events(
@@ -97,9 +95,8 @@ fn tell(
     delete, operation_id = "cancel_job", path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "Job")),
     responses(
         (status = 200, description = "The job, cancelled or about to be", body = JobDocument),
-        (status = 404, description = "There is no such job", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 409, description = "The job has ended", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        JobProblems,
     )
 )]
 pub async fn cancel(

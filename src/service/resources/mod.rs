@@ -11,6 +11,7 @@ pub mod documents;
 pub mod estimates;
 pub mod home;
 pub mod jobs;
+mod making;
 pub mod operations;
 pub mod paints;
 pub mod previews;

@@ -8,7 +8,9 @@ use utoipa::IntoParams;
 use super::documents::{PaintDocument, PaintList, PaintSummary};
 use super::visibility::Visibility;
 use crate::service::app::App;
-use crate::service::http::{Address, Answer, Keep, Kind, NoQuery, Problem, ProblemDocument, Query};
+use crate::service::http::{
+    Address, Answer, Keep, Kind, NoQuery, PaintProblems, Problem, ProblemDocument, Problems, Query,
+};
 use crate::service::work::Format;
 use crate::store::PaintRecord;
 
@@ -35,7 +37,7 @@ pub struct ListQuery {
     get, operation_id = "list_paints", path = "/v1/paints", tag = "paints", params(ListQuery),
     responses(
         (status = 200, description = "A page of paints", body = PaintList),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
     )
 )]
 pub async fn list(
@@ -99,8 +101,7 @@ fn summary(record: PaintRecord) -> PaintSummary {
     get, operation_id = "show_paint", path = "/v1/paints/{id}", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 200, description = "The paint", body = PaintDocument),
-        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
     )
 )]
 pub async fn show(
@@ -108,12 +109,7 @@ pub async fn show(
     Address(id): Address<String>,
     _: NoQuery,
 ) -> Result<Answer, Problem> {
-    let paint = app.paint(&id).await?;
-    Ok(Answer::result(
-        "application/json",
-        paint.document.clone(),
-        Keep::Revalidated,
-    ))
+    Ok(app.paint(&id).await?.told())
 }
 
 /// A paint as a `.paint` file.
@@ -121,8 +117,7 @@ pub async fn show(
     get, operation_id = "paint_file", path = "/v1/paints/{id}/paint", tag = "paints", params(("id" = String, Path, description = "Paint")),
     responses(
         (status = 200, description = "The file", body = Vec<u8>, content_type = "application/vnd.carpaint.paint"),
-        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
     )
 )]
 pub async fn file(
@@ -144,7 +139,7 @@ pub async fn file(
     responses(
         (status = 200, description = "The bytes", body = Vec<u8>, content_type = "application/octet-stream"),
         (status = 404, description = "There is no such paint, or it had no measurement", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
     )
 )]
 pub async fn measurement(
@@ -173,8 +168,7 @@ pub async fn measurement(
     responses(
         (status = 204, description = "It is gone"),
         (status = 409, description = "It is a sample", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
     )
 )]
 pub async fn delete(

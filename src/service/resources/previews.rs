@@ -10,8 +10,8 @@ use utoipa::ToSchema;
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::http::{
-    Address, Answer, Idempotency, Json, Keep, Kind, NoQuery, Problem, ProblemDocument, Query,
-    QueryOfTwo,
+    Address, Answer, BlendProblems, Idempotency, Json, Keep, Kind, NoQuery, PaintProblems, Problem,
+    ProblemDocument, Problems, Query, QueryOfTwo,
 };
 use crate::service::parameters::view::{self, Side, ViewQuery};
 use crate::service::parameters::{ProfileDocument, ProfileText, WeightQuery};
@@ -52,8 +52,7 @@ impl PreviewFormat {
             ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab"),
             ("Link" = String, description = "The picture's report")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
         (status = 400, description = "Weights that do not fit the blend, or a view that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        BlendProblems,
     )
 )]
 pub async fn of_blend(
@@ -79,8 +78,7 @@ pub async fn of_blend(
         (status = 200, description = "The picture", headers(
             ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab"),
             ("Link" = String, description = "The picture's report")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
-        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
     )
 )]
 pub async fn of_paint(
@@ -153,7 +151,7 @@ pub struct PreviewOrder {
             ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab")),
             content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
         (status = 422, description = "A paint that is not there, weights that do not fit, or a scene that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
     )
 )]
 pub async fn create(

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::service::app::App;
-use crate::service::http::{Address, Answer, Keep, Problem, ProblemDocument, Query};
+use crate::service::http::{Address, Answer, Keep, PaintProblems, Problem, ProblemDocument, Query};
 use crate::service::work::{Readings, WorkError};
 
 /// Where an instrument looks from.
@@ -30,8 +30,7 @@ pub struct ReadingQuery {
     responses(
         (status = 200, description = "A row for each angle, in the order asked for", body = serde_json::Value),
         (status = 400, description = "An angle that no instrument reads at", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
     )
 )]
 pub async fn show(
@@ -39,9 +38,8 @@ pub async fn show(
     Address(id): Address<String>,
     Query(query): Query<ReadingQuery>,
 ) -> Result<Answer, Problem> {
-    let begun = Instant::now();
-    let readings = read(&app, &id, query).await?;
-    Ok(Answer::json(&readings, Keep::Revalidated).stage("reading", begun.elapsed()))
+    let answer = |readings: &Readings| Answer::json(readings, Keep::Revalidated);
+    read(&app, &id, query, answer).await
 }
 
 /// Readings of a paint as comma-separated values, a line of column names first.
@@ -51,8 +49,7 @@ pub async fn show(
     responses(
         (status = 200, description = "A line for each angle, in the order asked for", body = String, content_type = "text/csv"),
         (status = 400, description = "An angle that no instrument reads at", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
     )
 )]
 pub async fn table(
@@ -60,19 +57,23 @@ pub async fn table(
     Address(id): Address<String>,
     Query(query): Query<ReadingQuery>,
 ) -> Result<Answer, Problem> {
-    let begun = Instant::now();
-    let readings = read(&app, &id, query).await?;
-    let name = format!("{id}.readings.csv");
-    Ok(
-        Answer::bytes("text/csv", readings.to_csv(), Keep::Revalidated)
-            .saved_as(&name)
-            .stage("reading", begun.elapsed()),
-    )
+    let answer = |readings: &Readings| {
+        let table = Answer::bytes("text/csv", readings.to_csv(), Keep::Revalidated);
+        table.saved_as(&format!("{id}.readings.csv"))
+    };
+    read(&app, &id, query, answer).await
 }
 
-async fn read(app: &App, id: &str, query: ReadingQuery) -> Result<Readings, Problem> {
+async fn read(
+    app: &App,
+    id: &str,
+    query: ReadingQuery,
+    answer: impl FnOnce(&Readings) -> Answer,
+) -> Result<Answer, Problem> {
+    let begun = Instant::now();
     let paint = app.paint(id).await?;
     let works = Arc::clone(&app.works);
     let read = move || works.readings(&paint.thing, query.angles.as_deref());
-    app.bench.run(read).await?.map_err(WorkError::of_query)
+    let readings = app.bench.run(read).await?.map_err(WorkError::of_query)?;
+    Ok(answer(&readings).stage("reading", begun.elapsed()))
 }

@@ -9,7 +9,10 @@ use utoipa::IntoParams;
 
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
-use crate::service::http::{Address, Answer, Keep, Problem, ProblemDocument, Query, QueryOfTwo};
+use crate::service::http::{
+    Address, Answer, BlendProblems, Keep, PaintProblems, Problem, ProblemDocument, Query,
+    QueryOfTwo,
+};
 use crate::service::ids;
 use crate::service::parameters::{ProfileText, WeightQuery, targets};
 use crate::service::shelf::Shelved;
@@ -42,8 +45,7 @@ pub struct ProfileQuery {
             (Vec<u8> = "application/zip"), (Vec<u8> = "model/gltf-binary"), (serde_json::Value = "application/json"),
             (Vec<u8> = "application/vnd.carpaint.paint"))),
         (status = 400, description = "Weights that do not fit the blend", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 404, description = "There is no such blend", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        BlendProblems,
     )
 )]
 pub async fn of_blend(
@@ -64,8 +66,7 @@ pub async fn of_blend(
         (status = 200, description = "The file", content(
             (Vec<u8> = "application/zip"), (Vec<u8> = "model/gltf-binary"), (serde_json::Value = "application/json"),
             (Vec<u8> = "application/vnd.carpaint.paint"))),
-        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
     )
 )]
 pub async fn of_paint(

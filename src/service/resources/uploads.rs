@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use super::documents::PaintDocument;
+use super::making;
 use crate::service::app::App;
 use crate::service::http::{
-    Answer, Idempotency, Keep, Prefer, Problem, ProblemDocument, Query, receiving,
+    Idempotency, Prefer, Problem, ProblemDocument, Problems, Query, receiving,
 };
 use crate::service::ids;
 use crate::service::parameters::{ProfileText, targets};
@@ -108,7 +109,7 @@ impl IngestQuery {
         (status = 202, description = "The job that makes it", body = JobDocument, headers(("Location" = String, description = "The job's address"))),
         (status = 413, description = "The upload is too large", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 422, description = "The upload is no measurement, or a damaged one", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
     )
 )]
 pub async fn upload(
@@ -143,15 +144,8 @@ pub async fn upload(
     let accepted = runner::to_its_end(accept(app.clone(), received, order, idempotency)).await?;
     let Accepted { id, job, picked } = accepted;
     let address = format!("/v1/paints/{id}");
-    let Some(job) = job else {
-        let known = app.paint(&id).await?.document.clone();
-        let answer = Answer::result("application/json", known, Keep::Revalidated);
-        let answer = answer.location(&address).picked(picked.as_ref());
-        return Ok(answer.into_response());
-    };
-    let made = || async { Ok(app.paint(&id).await?.document.clone()) };
-    let answer = prefer.answer(&app, &job, &address, made).await?;
-    Ok(targets::told(answer, picked.as_ref()))
+    let made = || app.paint(&id);
+    making::answer(&app, prefer, job, &address, picked.as_ref(), made).await
 }
 
 /// An upload that was kept.

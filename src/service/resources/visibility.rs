@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 
 use super::documents::PaintDocument;
 use crate::service::app::App;
-use crate::service::http::{Address, Answer, Json, Keep, NoQuery, Problem, ProblemDocument};
+use crate::service::http::{Address, Answer, Json, NoQuery, PaintProblems, Problem};
 use crate::store;
 
 /// Whether lists show a paint.
@@ -52,8 +52,7 @@ pub struct PaintChange {
     request_body = PaintChange,
     responses(
         (status = 200, description = "The paint as it is now", body = PaintDocument),
-        (status = 404, description = "There is no such paint", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = "default", description = "A problem", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
     )
 )]
 pub async fn change(
@@ -63,10 +62,5 @@ pub async fn change(
     Json(change): Json<PaintChange>,
 ) -> Result<Answer, Problem> {
     app.show_paint(&id, change.visibility.into()).await?;
-    let paint = app.paint(&id).await?;
-    Ok(Answer::result(
-        "application/json",
-        paint.document.clone(),
-        Keep::Revalidated,
-    ))
+    Ok(app.paint(&id).await?.told())
 }
