@@ -3,13 +3,14 @@
 //! One list for the command line (`--knob clusters=100`), JSON (`{"preset": "standard", "clusters": 100}`) and addresses
 //! (`profile=standard,clusters=100`). What is left out stays as the preset has it, which is `standard` unless named.
 
-use std::fmt;
-use std::str::FromStr;
+mod choices;
+mod error;
+mod reading;
 
-use serde::de::{self, MapAccess, Visitor, value::MapAccessDeserializer};
-use serde::{Deserialize, Deserializer, Serialize};
-use serde_json::{Map, Value};
+use serde::{Deserialize, Serialize};
 
+pub use self::choices::{CostKnob, Draw, Preset, Transport};
+pub use self::error::ProfileError;
 use super::Profile;
 use crate::blend::Order;
 use crate::export::Precision;
@@ -18,9 +19,6 @@ use crate::transport::{Cost, Method};
 
 /// Smoothing of a Sinkhorn transport that names none, as a part of the mean cost.
 const EPSILON: f64 = 0.01;
-
-/// Up to here every whole number is one of f64.
-const MOST_WHOLE: f64 = 9_007_199_254_740_992.0;
 
 /// Settings of a profile that were given; the others are the preset's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -148,90 +146,6 @@ mod read {
     }
 }
 
-/// Named profiles.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Preset {
-    /// Fast.
-    Draft,
-    /// The knee of the fronts.
-    #[default]
-    Standard,
-    /// What the others are measured against.
-    Reference,
-}
-
-/// Solvers of a profile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Transport {
-    /// The optimum.
-    Exact,
-    /// Smoothed, stopping at a residual.
-    Sinkhorn,
-    /// A feasible plan with the gap it may have.
-    Greedy,
-}
-
-/// Costs of a profile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CostKnob {
-    /// `d`.
-    Distance,
-    /// `d²`.
-    Squared,
-}
-
-/// Ways to draw a flake from a bundle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Draw {
-    /// Alias table: exact.
-    Alias,
-    /// 500 steps, as older shaders read them: the loss is stated.
-    InverseCdf,
-    /// Both.
-    Both,
-}
-
-/// Why there is no such profile.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProfileError {
-    /// Unknown preset.
-    #[error("there is no profile '{0}'; there are draft, standard and reference")]
-    Name(String),
-    /// A number out of range.
-    #[error("{knob} is {value}, accepted is {accepted}")]
-    Range {
-        /// The knob.
-        knob: &'static str,
-        /// What it was set to.
-        value: String,
-        /// What would be accepted.
-        accepted: &'static str,
-    },
-    /// A smoothing for a solver that has none.
-    #[error("epsilon is set, but transport is not sinkhorn")]
-    Epsilon,
-    /// A knob or a value that there is not.
-    #[error("{0}")]
-    Knob(String),
-}
-
-impl ProfileError {
-    /// The knob that is wrong, where it is one.
-    #[must_use]
-    pub const fn knob(&self) -> Option<&'static str> {
-        match self {
-            Self::Range { knob, .. } => Some(knob),
-            Self::Epsilon => Some("epsilon"),
-            Self::Name(_) | Self::Knob(_) => None,
-        }
-    }
-}
-
 impl Knobs {
     /// All knobs of a profile.
     #[must_use]
@@ -335,78 +249,6 @@ impl Knobs {
             (Method::Sinkhorn { .. }, Some(epsilon)) => Ok(Method::Sinkhorn { epsilon }),
             _ => Err(ProfileError::Epsilon),
         }
-    }
-
-    /// These knobs, and where they say nothing the others.
-    ///
-    /// # Errors
-    ///
-    /// [`ProfileError::Knob`] never: both are knobs already.
-    pub fn over(&self, other: &Self) -> Result<Self, ProfileError> {
-        let object = |knobs: &Self| match serde_json::to_value(knobs) {
-            Ok(Value::Object(map)) => map,
-            _ => Map::new(),
-        };
-        let mut all = object(other);
-        all.extend(object(self));
-        Self::of_object(all)
-    }
-
-    fn of_object(object: Map<String, Value>) -> Result<Self, ProfileError> {
-        serde_json::from_value(Value::Object(object)).map_err(|e| ProfileError::Knob(e.to_string()))
-    }
-
-    /// Reads a preset's name, knobs as text, or knobs as an object.
-    ///
-    /// # Errors
-    ///
-    /// What the deserializer refuses, naming the knob and what would be accepted.
-    pub fn of_name_or_object<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct NameOrObject;
-        impl<'de> Visitor<'de> for NameOrObject {
-            type Value = Knobs;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the name of a profile or an object of knobs")
-            }
-
-            fn visit_str<E: de::Error>(self, text: &str) -> Result<Knobs, E> {
-                text.parse().map_err(E::custom)
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Knobs, A::Error> {
-                Knobs::deserialize(MapAccessDeserializer::new(map))
-            }
-        }
-        deserializer.deserialize_any(NameOrObject)
-    }
-}
-
-impl FromStr for Knobs {
-    type Err = ProfileError;
-
-    /// A preset, knobs, or both, separated by commas.
-    fn from_str(text: &str) -> Result<Self, ProfileError> {
-        let mut object = Map::new();
-        for part in text.split(',').map(str::trim) {
-            let (name, value) = match part.split_once('=') {
-                Some((name, value)) => (name.trim(), value.trim()),
-                None if super::profile::PRESETS.contains(&part) => ("preset", part),
-                None => return Err(ProfileError::Name(part.to_owned())),
-            };
-            let read = match value.parse::<f64>() {
-                Ok(number) if number.fract() == 0.0 && number.abs() <= MOST_WHOLE => {
-                    Value::from(number as i64)
-                }
-                // JSON has no other numbers, and would take them for nothing.
-                Ok(number) if number.is_finite() => Value::from(number),
-                _ => Value::from(value),
-            };
-            if object.insert(name.to_owned(), read).is_some() {
-                return Err(ProfileError::Knob(format!("{name} is set twice")));
-            }
-        }
-        Self::of_object(object)
     }
 }
 

@@ -1,12 +1,12 @@
 //! `carpaint blend`: paints become a `.blend`.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::Args;
 use serde_json::json;
 
 use super::ingest::ReadingArgs;
+use super::made::{self, Stages};
 use super::output;
 use super::profile::TargetArgs;
 use super::progress::Progress;
@@ -52,32 +52,24 @@ impl Blend {
         if let Some(picked) = &picked {
             options.profile = *picked.profile();
         }
-        let start = Instant::now();
+        let mut stages = Stages::begin();
         let mut paints = Vec::with_capacity(self.inputs.len());
         for input in &self.inputs {
             let progress = Progress::reading(input);
             paints.push(open_paint(input, &options, &|share| progress.at(share))?);
         }
-        let read = start.elapsed();
+        stages.end("ingest");
         let progress = Progress::new("blending");
         let made = blend_paints(
             &paints.iter().collect::<Vec<_>>(),
             &options.profile,
             &|share| progress.at(share),
         )?;
-        let blended = start.elapsed();
+        stages.end("blend");
         output::replace(&self.out, &made.blend.to_bytes())?;
         drop(progress);
-        let written = start.elapsed();
-        if let Some(timings) = &self.timings {
-            let seconds = json!({
-                "ingest": read.as_secs_f64(),
-                "blend": blended.saturating_sub(read).as_secs_f64(),
-                "write": written.saturating_sub(blended).as_secs_f64(),
-                "total": written.as_secs_f64(),
-            });
-            output::replace(timings, seconds.to_string().as_bytes())?;
-        }
+        stages.end("write");
+        stages.write(self.timings.as_deref())?;
         let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
         if json {
             let correspondence = &describe_blend(&made.blend)["correspondence"];
@@ -87,12 +79,7 @@ impl Blend {
                     "notes": made.notes }),
             );
         }
-        if let Some(picked) = &picked {
-            eprintln!("target {}", picked.line());
-        }
-        for note in &made.notes {
-            eprintln!("note: {note}");
-        }
+        made::notes(picked.as_ref(), &made.notes);
         let report = made.blend.report();
         eprintln!(
             "{}: {} · {} slices, {} clusters, mean transport {:.2}, error {}",

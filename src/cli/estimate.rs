@@ -9,7 +9,7 @@ use serde_json::json;
 use super::ingest::ReadingArgs;
 use super::number::whole;
 use super::output;
-use super::preview::{ShapeName, Size};
+use super::preview::FrameArgs;
 use super::profile::TargetArgs;
 use super::weights::WeightArgs;
 use crate::workshop::{
@@ -71,22 +71,8 @@ enum What {
         input: String,
         #[command(flatten)]
         weights: WeightArgs,
-        /// What the paint is on.
-        #[arg(
-            long,
-            value_name = "SHAPE",
-            default_value = "sphere",
-            allow_hyphen_values = true
-        )]
-        scene: ShapeName,
-        /// Width and height in pixels.
-        #[arg(
-            long,
-            value_name = "WxH",
-            default_value = "512x512",
-            allow_hyphen_values = true
-        )]
-        size: Size,
+        #[command(flatten)]
+        frame: FrameArgs,
         /// Samples per pixel, in place of the profile's.
         #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true)]
         spp: Option<u32>,
@@ -179,8 +165,7 @@ impl Estimate {
             What::Preview {
                 input,
                 weights,
-                scene,
-                size,
+                frame,
                 spp,
                 ..
             } => {
@@ -189,8 +174,8 @@ impl Estimate {
                 let mut profile = options.profile;
                 profile.samples_per_pixel = spp.unwrap_or(profile.samples_per_pixel);
                 let view = PreviewOptions {
-                    scene: (*scene).into(),
-                    size: [size.width, size.height],
+                    scene: frame.scene.into(),
+                    size: [frame.size.width, frame.size.height],
                     samples_per_pixel: profile.samples_per_pixel,
                     environment: None,
                     lights: None,

@@ -2,11 +2,11 @@
 
 use std::cell::RefCell;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
+use super::made::{self, Stages};
 use super::number::{real, whole};
 use super::profile::{ProfileArgs, TargetArgs};
 use super::progress::Progress;
@@ -128,33 +128,19 @@ impl Ingest {
             options.profile = *picked.profile();
         }
         let progress = Progress::new("ingesting");
-        let start = Instant::now();
-        let stages = RefCell::new(Vec::new());
-        let ended = |stage| stages.borrow_mut().push((stage, start.elapsed()));
+        let stages = RefCell::new(Stages::begin());
+        let ended = |stage| stages.borrow_mut().end(stage);
         let paint = ingest_in_stages(&path, &options, &|share| progress.at(share), &ended)?;
         output::replace(&self.out, &paint.to_bytes())?;
         ended("write");
         drop(progress);
-        if let Some(timings) = &self.timings {
-            let (mut seconds, mut before) = (serde_json::Map::new(), Duration::ZERO);
-            for (stage, end) in stages.take() {
-                seconds.insert(
-                    stage.to_owned(),
-                    json!(end.saturating_sub(before).as_secs_f64()),
-                );
-                before = end;
-            }
-            seconds.insert("total".to_owned(), json!(before.as_secs_f64()));
-            output::replace(timings, json!(seconds).to_string().as_bytes())?;
-        }
+        stages.borrow().write(self.timings.as_deref())?;
         if json {
             return output::print_json(
                 &json!({ "out": self.out, "profile": options.profile.name(), "picked": picked, "paint": show::summary(&paint) }),
             );
         }
-        if let Some(picked) = &picked {
-            eprintln!("target {}", picked.line());
-        }
+        made::notes(picked.as_ref(), &[]);
         for warning in &paint.warnings {
             eprintln!("warning: {warning}");
         }

@@ -8,6 +8,7 @@ mod bundle;
 mod estimate;
 mod evaluate;
 mod ingest;
+mod made;
 mod number;
 mod output;
 mod preview;

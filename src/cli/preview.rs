@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 use std::str::FromStr;
-use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use serde_json::json;
 
 use super::ingest::ReadingArgs;
+use super::made::{self, Stages};
 use super::number::whole;
 use super::output;
 use super::profile::TargetArgs;
@@ -25,22 +24,8 @@ pub struct Preview {
     input: String,
     #[command(flatten)]
     weights: WeightArgs,
-    /// What the paint is on, 40 mm across and near enough to tell its flakes.
-    #[arg(
-        long,
-        value_name = "SHAPE",
-        default_value = "sphere",
-        allow_hyphen_values = true
-    )]
-    scene: ShapeName,
-    /// Width and height in pixels.
-    #[arg(
-        long,
-        value_name = "WxH",
-        default_value = "512x512",
-        allow_hyphen_values = true
-    )]
-    size: Size,
+    #[command(flatten)]
+    frame: FrameArgs,
     /// Samples per pixel, in place of the profile's.
     #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true,
         conflicts_with_all = ["max_error", "max_seconds"])]
@@ -56,6 +41,27 @@ pub struct Preview {
     /// Write the seconds each stage took.
     #[arg(long, value_name = "T.json")]
     timings: Option<PathBuf>,
+}
+
+/// What a picture shows, and how large it is.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct FrameArgs {
+    /// What the paint is on, 40 mm across and near enough to tell its flakes.
+    #[arg(
+        long,
+        value_name = "SHAPE",
+        default_value = "sphere",
+        allow_hyphen_values = true
+    )]
+    pub scene: ShapeName,
+    /// Width and height in pixels.
+    #[arg(
+        long,
+        value_name = "WxH",
+        default_value = "512x512",
+        allow_hyphen_values = true
+    )]
+    pub size: Size,
 }
 
 /// What the paint is on.
@@ -109,7 +115,7 @@ impl Preview {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
         let options = ReadingArgs::default().options(None, &self.target.profile)?;
         let format = PictureFormat::of_path(&self.out)?;
-        let start = Instant::now();
+        let mut stages = Stages::begin();
         let progress = Progress::reading(&self.input);
         let thing = open(&self.input, &options, &|share| progress.at(share))?;
         drop(progress);
@@ -120,8 +126,8 @@ impl Preview {
             .map(|path| read_environment(path, &options.limits))
             .transpose()?;
         let mut wanted = PreviewOptions {
-            scene: self.scene.into(),
-            size: [self.size.width, self.size.height],
+            scene: self.frame.scene.into(),
+            size: [self.frame.size.width, self.frame.size.height],
             samples_per_pixel: self.spp.unwrap_or(options.profile.samples_per_pixel),
             environment,
             lights: None,
@@ -137,7 +143,7 @@ impl Preview {
         if let Some(picked) = &picked {
             wanted.samples_per_pixel = picked.profile().samples_per_pixel;
         }
-        let opened = start.elapsed();
+        stages.end("open");
         let progress = Progress::new("drawing");
         let made = preview(
             &thing,
@@ -147,36 +153,12 @@ impl Preview {
             &options.limits,
             &|share| progress.at(share),
         )?;
-        let drawn = start.elapsed();
+        stages.end("draw");
         output::replace(&self.out, &made.bytes)?;
         drop(progress);
-        if let Some(timings) = &self.timings {
-            let written = start.elapsed();
-            let seconds = json!({
-                "open": opened.as_secs_f64(),
-                "draw": drawn.saturating_sub(opened).as_secs_f64(),
-                "write": written.saturating_sub(drawn).as_secs_f64(),
-                "total": written.as_secs_f64(),
-            });
-            output::replace(timings, seconds.to_string().as_bytes())?;
-        }
-        if json {
-            return output::print_json(
-                &json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report, "picked": picked }),
-            );
-        }
-        if let Some(picked) = &picked {
-            eprintln!("target {}", picked.line());
-        }
-        for line in &made.notes {
-            eprintln!("note: {line}");
-        }
-        eprintln!(
-            "{}: {} x {}",
-            self.out.display(),
-            self.size.width,
-            self.size.height
-        );
-        Ok(())
+        stages.end("write");
+        stages.write(self.timings.as_deref())?;
+        let size = format!("{} x {}", self.frame.size.width, self.frame.size.height);
+        made::tell(json, &self.out, &made, picked.as_ref(), &size)
     }
 }

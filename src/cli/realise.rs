@@ -1,12 +1,11 @@
 //! `carpaint realise`: a blend at given weights becomes a file that others use.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::Args;
-use serde_json::json;
 
 use super::ingest::ReadingArgs;
+use super::made::{self, Stages};
 use super::output;
 use super::profile::TargetArgs;
 use super::progress::Progress;
@@ -35,7 +34,7 @@ pub struct Realise {
 
 impl Realise {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        let start = Instant::now();
+        let mut stages = Stages::begin();
         let mut options = ReadingArgs::default().options(None, &self.target.profile)?;
         let format = Format::of_path(&self.out)?;
         let progress = Progress::reading(&self.input);
@@ -51,32 +50,13 @@ impl Realise {
         if let Some(picked) = &picked {
             options.profile = *picked.profile();
         }
-        let opened = start.elapsed();
+        stages.end("open");
         let made = realise(&thing, weights.as_ref(), format, &options.profile)?;
-        let realised = start.elapsed();
+        stages.end("realise");
         output::replace(&self.out, &made.bytes)?;
-        if let Some(timings) = &self.timings {
-            let written = start.elapsed();
-            let seconds = json!({
-                "open": opened.as_secs_f64(),
-                "realise": realised.saturating_sub(opened).as_secs_f64(),
-                "write": written.saturating_sub(realised).as_secs_f64(),
-                "total": written.as_secs_f64(),
-            });
-            output::replace(timings, seconds.to_string().as_bytes())?;
-        }
-        if json {
-            return output::print_json(
-                &json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report, "picked": picked }),
-            );
-        }
-        if let Some(picked) = &picked {
-            eprintln!("target {}", picked.line());
-        }
-        for line in &made.notes {
-            eprintln!("note: {line}");
-        }
-        eprintln!("{}: {} bytes", self.out.display(), made.bytes.len());
-        Ok(())
+        stages.end("write");
+        stages.write(self.timings.as_deref())?;
+        let size = format!("{} bytes", made.bytes.len());
+        made::tell(json, &self.out, &made, picked.as_ref(), &size)
     }
 }

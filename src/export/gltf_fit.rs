@@ -10,12 +10,16 @@
 //! Levenberg-Marquardt on differences in the metric of CIEDE2000 at the paint's colors, from fixed starts: the same
 //! paint gives the same material. The reported loss is CIEDE2000 itself.
 
-use serde::Serialize;
+mod loss;
+mod targets;
 
-use super::gltf_brdf::{Cosines, GltfMaterial, dielectric_f0};
+pub use self::loss::LossReport;
+pub(super) use self::loss::loss;
+use self::loss::reflected;
+use self::targets::{Target, targets};
+use super::gltf_brdf::{GltfMaterial, dielectric_f0};
 use super::gltf_search::{Problem, minimise};
-use crate::color::{Lab, LinearRgb, ciede2000};
-use crate::paint::{ASPECULAR_DEG, Chi, Direction, Reflectance, instrument_pairs};
+use crate::paint::Reflectance;
 
 /// Share of the merit by which iridescence must improve it.
 const WORTH_A_FILM: f64 = 0.7;
@@ -25,115 +29,6 @@ const GOOD_ENOUGH: f64 = 6.0;
 const HUE_TRAVEL_DEG: f64 = 20.0;
 /// Widest lobe that looks like lacquer: a highlight with a visible rim.
 const LACQUER_ALPHA: f64 = 0.1;
-/// Weight of the pairs beside the instrument's.
-const BESIDE: f64 = 0.1;
-
-/// How far a GLB's material is from its paint, textures averaged.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LossReport {
-    /// Aspecular angles of the geometries, degrees; light at 45°.
-    pub aspecular_deg: [f64; 6],
-    /// CIEDE2000 between material and paint at each.
-    pub delta_e2000: [f64; 6],
-    /// The same with the material averaged over the normals of its texture, as a close view averages.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub delta_e2000_over_normals: Option<[f64; 6]>,
-    /// Median of `delta_e2000`.
-    pub median: f64,
-    /// Largest of `delta_e2000`.
-    pub worst: f64,
-    /// CIELAB of the paint, D65, 2° observer.
-    pub paint_lab: [[f64; 3]; 6],
-    /// CIELAB of the material.
-    pub material_lab: [[f64; 3]; 6],
-}
-
-/// A pair of directions and what the paint shows there.
-struct Target {
-    cosines: Cosines,
-    color: LinearRgb,
-    lab: Lab,
-    metric: Metric,
-    weight: f64,
-}
-
-/// CIEDE2000 near one color: differences of lightness, chroma and hue over their tolerances.
-struct Metric {
-    chroma_axis: [f64; 2],
-    tolerance: [f64; 3],
-}
-
-impl Metric {
-    fn at(lab: Lab) -> Self {
-        let chroma = lab.a.hypot(lab.b);
-        let chroma_axis = if chroma > 1e-9 {
-            [lab.a / chroma, lab.b / chroma]
-        } else {
-            [1.0, 0.0]
-        };
-        let l50 = (lab.l - 50.0).powi(2);
-        let tolerance = [
-            1.0 + 0.015 * l50 / (20.0 + l50).sqrt(),
-            1.0 + 0.045 * chroma,
-            1.0 + 0.015 * chroma,
-        ];
-        Self {
-            chroma_axis,
-            tolerance,
-        }
-    }
-
-    fn difference(&self, from: Lab, to: Lab) -> [f64; 3] {
-        let [u, v] = self.chroma_axis;
-        let (da, db) = (to.a - from.a, to.b - from.b);
-        let parts = [to.l - from.l, u * da + v * db, u * db - v * da];
-        std::array::from_fn(|k| parts[k] / self.tolerance[k])
-    }
-}
-
-fn target(
-    reflectance: &Reflectance<'_>,
-    (wi, wo): (Direction, Direction),
-    weight: f64,
-) -> Option<Target> {
-    let color = reflectance.evaluate(wi, wo, Chi::Table);
-    let lab = reflected(color);
-    Cosines::of(wi, wo).map(|cosines| Target {
-        cosines,
-        color,
-        lab,
-        metric: Metric::at(lab),
-        weight,
-    })
-}
-
-/// What the paint shows at the instrument's geometries and beside them.
-fn targets(reflectance: &Reflectance<'_>) -> Vec<Target> {
-    instrument_pairs()
-        .into_iter()
-        .map(|pair| (pair, 1.0))
-        .chain(pairs_beside().map(|pair| (pair, BESIDE)))
-        .filter_map(|(pair, weight)| target(reflectance, pair, weight))
-        .collect()
-}
-
-/// CIELAB of a BRDF value under the instrument's light.
-fn reflected(f: LinearRgb) -> Lab {
-    Lab::from_rgb(f.map(|v| std::f64::consts::PI * v))
-}
-
-/// Pairs beside the instrument's: light at 15° and 65°, so that the lobe holds where the instrument does not look.
-fn pairs_beside() -> impl Iterator<Item = (Direction, Direction)> {
-    [15.0_f64, 65.0].into_iter().flat_map(|light| {
-        [15.0, 35.0, 60.0].map(|aspecular| {
-            let (light, view) = (light.to_radians(), (light - aspecular).to_radians());
-            (
-                [-light.sin(), 0.0, light.cos()],
-                [view.sin(), 0.0, view.cos()],
-            )
-        })
-    })
-}
 
 /// Whether the instrument sees hues that no single color explains.
 fn hue_travels(targets: &[Target]) -> bool {
@@ -160,66 +55,6 @@ pub(super) fn fit(reflectance: &Reflectance<'_>) -> (GltfMaterial, LossReport) {
         }
     }
     (best.material, loss(&best.material, reflectance, None))
-}
-
-/// CIEDE2000 of a material against a paint; `normals` are those of a texture to average over.
-pub(super) fn loss(
-    material: &GltfMaterial,
-    reflectance: &Reflectance<'_>,
-    normals: Option<&[Direction]>,
-) -> LossReport {
-    let labs = |pair: (Direction, Direction)| {
-        let paint = reflected(reflectance.evaluate(pair.0, pair.1, Chi::Table));
-        (paint, reflected(material.evaluate(pair.0, pair.1)))
-    };
-    let pairs = instrument_pairs();
-    let both = pairs.map(labs);
-    let delta_e2000 = both.map(|(paint, material)| ciede2000(paint, material));
-    let delta_e2000_over_normals = normals.map(|normals| {
-        std::array::from_fn(|k| {
-            ciede2000(
-                both[k].0,
-                reflected(over_normals(material, pairs[k], normals)),
-            )
-        })
-    });
-    let mut sorted = delta_e2000;
-    sorted.sort_by(f64::total_cmp);
-    LossReport {
-        aspecular_deg: ASPECULAR_DEG,
-        delta_e2000,
-        delta_e2000_over_normals,
-        median: f64::midpoint(sorted[2], sorted[3]),
-        worst: sorted[5],
-        paint_lab: both.map(|(paint, _)| paint.to_array()),
-        material_lab: both.map(|(_, material)| material.to_array()),
-    }
-}
-
-/// Mean of a material over tilted normals, seen as one surface.
-fn over_normals(
-    material: &GltfMaterial,
-    (wi, wo): (Direction, Direction),
-    normals: &[Direction],
-) -> LinearRgb {
-    let mut sum = [0.0; 3];
-    for normal in normals {
-        let [li, lo] = [wi, wo].map(|w| in_frame(*normal, w));
-        let f = material.evaluate(li, lo);
-        // A viewer multiplies by the cosine against the tilted normal, the instrument divides by the flat one.
-        for k in 0..3 {
-            sum[k] += f[k] * li[2].max(0.0) / wi[2];
-        }
-    }
-    #[allow(clippy::cast_precision_loss)] // a handful
-    sum.map(|v| v / normals.len().max(1) as f64)
-}
-
-/// A direction in the frame of a normal near the pole: the shortest rotation that takes the normal to (0, 0, 1).
-fn in_frame(n: Direction, w: Direction) -> Direction {
-    let dot = n[0] * w[0] + n[1] * w[1] + n[2] * w[2];
-    let across = (w[2] + dot) / (1.0 + n[2]);
-    [w[0] - across * n[0], w[1] - across * n[1], dot]
 }
 
 /// A candidate.

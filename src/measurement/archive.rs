@@ -223,6 +223,15 @@ impl Archive {
         }
     }
 
+    /// The first file of this name that stands inside a folder of the archive.
+    fn inside_a_folder(&self, name: &str) -> Option<String> {
+        let Self::Zip { index, .. } = self else {
+            return None;
+        };
+        let within = |path: &&String| path.strip_suffix(name).is_some_and(|p| p.ends_with('/'));
+        index.keys().filter(within).min().cloned()
+    }
+
     /// Replaces `into` by the file of this name, at most `most` bytes of it.
     pub(super) fn read(
         &self,
@@ -243,6 +252,7 @@ impl Archive {
         };
         let missing = || PackageError::Missing {
             file: name.to_owned(),
+            inside: self.inside_a_folder(name),
         };
         match self {
             Self::Zip {

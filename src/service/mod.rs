@@ -1,58 +1,38 @@
 //! The service: paints, blends, realisations, previews and jobs over HTTP.
 //!
-//! One file per resource. What holds for all of them is in few places: every request passes the `envelope` (id, time,
-//! counts, panics), every refusal becomes a problem in `problem`, everything read from a request is read strictly in
-//! `extract` and `query`, every answer is made in `answer` (`ETag`, how long it keeps), and everything that computes
-//! does so at the `workbench`, longer things as a job of the `runner`.
+//! | room | what is in it |
+//! |---|---|
+//! | `serve` | addresses and connections: begin here |
+//! | `http` | what holds for every request: reading it strictly, answers, problems |
+//! | `parameters` | what several resources are asked in the same words: accuracy, targets, weights, views |
+//! | `resources` | one file per resource: paints, blends, realisations, previews, jobs … |
+//! | `work` | what computes: the workshop, places to compute at, jobs |
+//! | `app` | what all handlers share: the store, the work, the counts |
+//! | `shelf`, `keeping` | paints and blends as they are read, kept and removed |
 //!
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
 //! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`).
 
-mod accepted;
-mod accuracy;
-mod answer;
 mod app;
-mod blend_bundles;
-mod blends;
-mod docs;
-mod documents;
-mod envelope;
-mod estimates;
-mod extract;
-mod home;
-mod idempotency;
+mod http;
 mod ids;
-mod jobs;
+mod keeping;
 mod metrics;
-mod operations;
-mod paints;
-mod previews;
-mod problem;
-mod profile;
-mod query;
-mod readings;
-mod realisations;
-mod runner;
+mod parameters;
+mod resources;
 mod samples;
 mod serve;
-mod targets;
-mod visibility;
-mod waiting;
-mod watchers;
-mod weights;
-mod workbench;
-mod works;
-mod workshop;
+mod shelf;
+mod work;
 
 pub use app::App;
-pub use docs::interface;
+pub use resources::docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
-pub use works::{
+pub use work::{
     Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
-    Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
+    Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works, Workshop,
 };
-pub use workshop::Workshop;
 
 use std::path::PathBuf;
 use std::time::Duration;

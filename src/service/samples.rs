@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::app::App;
+use super::http::Problem;
 use super::ids;
-use super::problem::Problem;
-use super::workbench::{Workbench, call_off};
+use super::work::{Workbench, call_off};
 use crate::accuracy::Profile;
 use crate::store::Visibility;
 use crate::workshop::{SAMPLES, Sample};

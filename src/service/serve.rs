@@ -18,14 +18,13 @@ use tower::ServiceBuilder;
 use tower::limit::GlobalConcurrencyLimitLayer;
 
 use super::app::App;
-use super::envelope::envelope;
-use super::extract::JSON_BYTES;
-use super::problem::Problem;
-use super::works::Works;
-use super::{
-    ServiceConfig, accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations,
-    paints, previews, readings, realisations, runner, visibility,
+use super::http::{JSON_BYTES, Problem, envelope};
+use super::resources::{
+    accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations, paints, previews,
+    readings, realisations, uploads, visibility,
 };
+use super::work::{Works, runner};
+use crate::service::ServiceConfig;
 use crate::store::StoreError;
 
 /// Why a service did not start, or did not go on.
@@ -88,7 +87,7 @@ pub fn router(app: App) -> Router {
 /// What works on paints.
 fn resources() -> Router<App> {
     Router::new()
-        .route("/v1/paints", get(paints::list).post(paints::upload))
+        .route("/v1/paints", get(paints::list).post(uploads::upload))
         .route(
             "/v1/paints/{id}",
             get(paints::show)

@@ -6,7 +6,7 @@ use super::WorkshopError;
 use super::ingest::{Measurement, table_of};
 use crate::measurement::{FlakePictures as _, MeasuredBrdf as _, Package, PackageBase};
 use crate::paint::{
-    self, CarPaint, Chi, Direction, HalfAngles, Limits, Reflectance, at_angles, half_angles,
+    self, CarPaint, Chi, Coat, Direction, HalfAngles, Limits, Reflectance, at_angles, half_angles,
     refract,
 };
 
@@ -73,20 +73,23 @@ pub fn evaluate(paint: &CarPaint, pairs: &Pairs, chi: Chi) -> Values {
         .iter()
         .map(|&[wi, wo]| Some(reflectance.evaluate(wi, wo, chi)))
         .collect();
-    let mirror = paint.coat.filter(crate::paint::Coat::is_mirror).map(|_| {
-        pairs
-            .pairs
-            .iter()
-            .map(|&[wi, wo]| {
-                if wi[2] > 0.0 {
-                    reflectance.mirror(wo)
-                } else {
-                    0.0
-                }
-            })
-            .collect()
-    });
-    Values { f, mirror }
+    Values {
+        f,
+        mirror: mirror_of(paint.coat, pairs),
+    }
+}
+
+/// Weight of the perfect mirror image of a coat for every pair, `None` where the coat shows none.
+fn mirror_of(coat: Option<Coat>, pairs: &Pairs) -> Option<Vec<f64>> {
+    let coat = coat.filter(Coat::is_mirror)?;
+    let weight = |&[wi, wo]: &[Direction; 2]| {
+        if wi[2] > 0.0 && wo[2] > 0.0 {
+            coat.mirror(wo[2])
+        } else {
+            0.0
+        }
+    };
+    Some(pairs.pairs.iter().map(weight).collect())
 }
 
 /// Evaluates a measurement as it is: negative values kept, `None` where it holds nothing. Of a package, the base plus the
@@ -96,15 +99,20 @@ pub fn evaluate(paint: &CarPaint, pairs: &Pairs, chi: Chi) -> Values {
 ///
 /// [`WorkshopError`] for a package whose table or pictures are damaged.
 pub fn evaluate_raw(measurement: &Measurement, pairs: &Pairs) -> Result<Values, WorkshopError> {
-    let f = match measurement {
-        Measurement::Brdf(bare) => pairs
-            .pairs
-            .iter()
-            .map(|&[wi, wo]| bare.brdf.reflectance(wi, wo))
-            .collect(),
-        Measurement::Package(package) => raw_package(package, pairs)?,
-    };
-    Ok(Values { f, mirror: None })
+    match measurement {
+        Measurement::Brdf(bare) => Ok(Values {
+            f: pairs
+                .pairs
+                .iter()
+                .map(|&[wi, wo]| bare.brdf.reflectance(wi, wo))
+                .collect(),
+            mirror: None,
+        }),
+        Measurement::Package(package) => Ok(Values {
+            f: raw_package(package, pairs)?,
+            mirror: mirror_of(package.coat, pairs),
+        }),
+    }
 }
 
 fn raw_package(package: &Package, pairs: &Pairs) -> Result<Vec<Option<[f64; 3]>>, WorkshopError> {

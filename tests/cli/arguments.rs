@@ -1,6 +1,6 @@
 //! Silly values of every argument: each is refused by its own name, with what it was and what would be accepted.
 
-use crate::Desk;
+use crate::desk::Desk;
 
 #[test]
 fn a_silly_value_is_refused_with_its_argument_and_what_is_accepted() {

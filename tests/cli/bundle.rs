@@ -1,6 +1,6 @@
 //! The bundle of a whole blend.
 
-use super::{Desk, json};
+use crate::desk::{Desk, json};
 
 #[test]
 fn a_blend_is_bundled_the_same_on_any_number_of_threads() {

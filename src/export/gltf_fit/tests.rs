@@ -1,6 +1,7 @@
 //! Materials that must be met, and films that must be found or left out.
 
 use super::*;
+use crate::color::Lab;
 use crate::export::gltf_brdf::thin_film;
 use crate::export::made_up::metallic;
 use crate::paint::{AngleGrid, CarPaint, Coat, ColorTable, Lobe};

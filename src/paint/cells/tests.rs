@@ -63,32 +63,31 @@ fn every_interval_of_numbers_covers_its_share_of_the_tile() {
 
 #[test]
 fn a_tile_keeps_the_shares_of_its_picks_at_every_angle() {
-    // Up to four groups of epochs meet at an angle; in each, a share is cut out of the ranks at k ≤ 11 pairs of ends, and
-    // each end misses by half a cell, of either sign. Cells scattered at random would miss by √(7000 · 0.5 · 0.5) = 42.
+    // Four groups of epochs meet at an angle. In each a share is cut out of the ranks at up to 11 pairs of ends, each of
+    // which misses by an even part of a cell, 1/12 of a squared area; and a group's phases thin the n cells of the share
+    // evenly by number, so that only the scatter of their areas stays. Cells dealt by chance would scatter twice as far.
     let tile = RandomTexture::new(256, 256, 3.0, 1);
-    let cell_area = 9.0 / 65_536.0;
-    let mut squares = Vec::new();
-    for (h, d) in [
-        (0.0, 0.0),
-        (4.0, 0.0),
-        (7.0, 11.0),
-        (33.0, 50.0),
-        (61.0, 88.0),
-    ] {
-        for share in [0.01, 0.1, 0.5] {
-            let below = tile
-                .cells()
-                .iter()
-                .filter(|cell| TexelDraw::of(**cell, h, d, [10.0; 2]).pick < share)
-                .count();
-            squares.push(((below as f64 / 65_536.0 - f64::from(share)) / cell_area).powi(2));
-        }
+    let mut areas = std::collections::HashMap::new();
+    for cell in tile.cells() {
+        *areas.entry(cell).or_insert(0.0) += 1.0;
     }
-    let off = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-    assert!(
-        off < 0.5 * (4.0 * 2.0 * 11.0_f64).sqrt() * 1.5,
-        "{off} cells"
-    );
+    let count = areas.len() as f64;
+    let mean = 65_536.0 / count;
+    let square = areas.values().map(|a| a * a).sum::<f64>() / count / (mean * mean);
+    for share in [0.01_f32, 0.1, 0.5] {
+        let angles: Vec<(f32, f32)> = (0_u8..20)
+            .map(|k| (4.3 * f32::from(k), (37.0 * f32::from(k)) % 90.0))
+            .collect();
+        let squares = angles.iter().map(|&(h, d)| {
+            let picks = |cell: &u32| TexelDraw::of(*cell, h, d, [10.0; 2]).pick < share;
+            let below = tile.cells().iter().filter(|cell| picks(cell)).count() as f64;
+            ((below - 65_536.0 * f64::from(share)) / mean).powi(2)
+        });
+        let off = (squares.sum::<f64>() / angles.len() as f64).sqrt();
+        let cells = count * f64::from(share);
+        let argued = (4.0 * 2.0 * 11.0 / 12.0 * square + 0.75 * cells * (square - 1.0)).sqrt();
+        assert!(off < argued, "{share}: {off} cells, not {argued}");
+    }
 }
 
 #[test]

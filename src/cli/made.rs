@@ -1,0 +1,75 @@
+//! What a command tells about the file it made, and how long the stages took.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use serde_json::{Map, json};
+
+use super::output;
+use crate::workshop::{Made, Picked, WorkshopError};
+
+/// The seconds of a command's stages.
+#[derive(Debug)]
+pub struct Stages {
+    begun: Instant,
+    ended: Vec<(&'static str, Duration)>,
+}
+
+impl Stages {
+    /// The first stage begins.
+    pub fn begin() -> Self {
+        Self {
+            begun: Instant::now(),
+            ended: Vec::new(),
+        }
+    }
+
+    /// A stage is over, the next begins.
+    pub fn end(&mut self, stage: &'static str) {
+        self.ended.push((stage, self.begun.elapsed()));
+    }
+
+    /// Writes the seconds of each and of all, where there is a file for them.
+    pub fn write(&self, timings: Option<&Path>) -> Result<(), WorkshopError> {
+        let Some(timings) = timings else {
+            return Ok(());
+        };
+        let mut seconds = Map::new();
+        let mut before = Duration::ZERO;
+        for &(stage, end) in &self.ended {
+            let own = end.saturating_sub(before);
+            seconds.insert(stage.to_owned(), json!(own.as_secs_f64()));
+            before = end;
+        }
+        seconds.insert("total".to_owned(), json!(before.as_secs_f64()));
+        output::replace(timings, json!(seconds).to_string().as_bytes())
+    }
+}
+
+/// Tells what was made: one JSON object, or notes and a last line for people.
+pub fn tell(
+    json: bool,
+    out: &Path,
+    made: &Made,
+    picked: Option<&Picked>,
+    size: &str,
+) -> Result<(), WorkshopError> {
+    if json {
+        return output::print_json(
+            &json!({ "out": out, "bytes": made.bytes.len(), "report": made.report, "picked": picked }),
+        );
+    }
+    notes(picked, &made.notes);
+    eprintln!("{}: {size}", out.display());
+    Ok(())
+}
+
+/// What was picked for a target, and what the user should know.
+pub fn notes(picked: Option<&Picked>, notes: &[String]) {
+    if let Some(picked) = picked {
+        eprintln!("target {}", picked.line());
+    }
+    for note in notes {
+        eprintln!("note: {note}");
+    }
+}

@@ -1,0 +1,85 @@
+//! What the manifest says about the readings of a multi-angle instrument.
+
+use super::field::Field;
+use crate::color::{Illuminant, Observer};
+use crate::measurement::package::PackageError;
+use crate::paint::Limits;
+
+/// Readings of a portable multi-angle instrument, as they came.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MultiAngle {
+    /// Angle of the light from the normal, in air, degrees.
+    pub illumination_deg: f64,
+    /// Light that L, a, b hold for.
+    pub illuminant: Illuminant,
+    /// Observer that L, a, b hold for.
+    pub observer: Observer,
+    /// Names of the columns; the first is `aspecular_deg`.
+    pub columns: Vec<String>,
+    /// One number per column.
+    pub rows: Vec<Vec<f64>>,
+}
+
+pub(super) fn multi_angle(
+    field: &Field,
+    limits: &Limits,
+    warnings: &mut Vec<String>,
+) -> Result<MultiAngle, PackageError> {
+    field.object(
+        &[
+            "illumination_deg",
+            "illuminant",
+            "observer",
+            "columns",
+            "rows",
+        ],
+        warnings,
+    )?;
+    let illuminant = field.want("illuminant", "\"D65\" or \"D50\"")?;
+    let observer = field.want("observer", "\"2\" or \"10\"")?;
+    let list = field.want("columns", "a list of names, the first aspecular_deg")?;
+    let mut columns = Vec::new();
+    for column in list.list(1000, "names")? {
+        columns.push(column.text()?.to_owned());
+    }
+    let has = |name: &str| columns.iter().any(|c| c == name);
+    let colors = has("L") && has("a") && has("b") || columns.iter().any(|c| c.starts_with("nm"));
+    if columns.first().map(String::as_str) != Some("aspecular_deg") || !colors {
+        return list.refuse("aspecular_deg first, then L, a, b or spectral columns nm400 to nm700");
+    }
+    let mut rows = Vec::new();
+    for row in field
+        .want("rows", "a list of rows")?
+        .list(limits.angles, "rows")?
+    {
+        let cells = row.list(columns.len(), "numbers")?;
+        if cells.len() != columns.len() {
+            return row.refuse(format!("{} numbers, one per column", columns.len()));
+        }
+        let number = |f: &Field| f.number(-1e6, 1e6, "a number from -1000000 to 1000000");
+        let angle = cells[0].number(-90.0, 180.0, "an aspecular angle from -90 to 180 degrees")?;
+        let rest = cells[1..].iter().map(number);
+        rows.push(
+            std::iter::once(Ok(angle))
+                .chain(rest)
+                .collect::<Result<Vec<f64>, _>>()?,
+        );
+    }
+    Ok(MultiAngle {
+        illumination_deg: field
+            .want("illumination_deg", "0 to 90")?
+            .number(0.0, 90.0, "0 to 90")?,
+        illuminant: match illuminant.text()? {
+            "D65" => Illuminant::D65,
+            "D50" => Illuminant::D50,
+            _ => return illuminant.refuse("\"D65\" or \"D50\""),
+        },
+        observer: match observer.text()? {
+            "2" => Observer::Two,
+            "10" => Observer::Ten,
+            _ => return observer.refuse("\"2\" or \"10\""),
+        },
+        columns,
+        rows,
+    })
+}

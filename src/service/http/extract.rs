@@ -1,0 +1,374 @@
+//! What handlers take in: body, query and path, each refused with a problem that says where and what instead.
+
+use axum::body::Bytes;
+use axum::extract::rejection::BytesRejection;
+use axum::extract::{FromRequest, FromRequestParts, Path, Request};
+use axum::http::request::Parts;
+use axum::http::{StatusCode, header};
+use serde::de::{DeserializeOwned, IgnoredAny};
+use utoipa::{IntoParams, PartialSchema};
+
+use super::kind::Kind;
+use super::problem::{Place, Problem};
+use super::{accepted, query};
+use crate::service::app::App;
+use crate::workshop;
+
+/// Most bytes of a JSON body; the router holds bodies to it.
+pub const JSON_BYTES: usize = 64 << 10;
+
+/// Most characters of a refused value that are told.
+const LONGEST_GIVEN: usize = 80;
+
+/// A JSON body. Its type must refuse unknown fields.
+#[derive(Clone, Copy, Debug)]
+pub struct Json<T>(pub T);
+
+/// A query whose parameters are the fields of `T`, and no others.
+#[derive(Clone, Copy, Debug)]
+pub struct Query<T>(pub T);
+
+/// A query whose parameters are the fields of `A` and those of `B`.
+#[derive(Clone, Copy, Debug)]
+pub struct QueryOfTwo<A, B>(pub A, pub B);
+
+/// No query at all.
+#[derive(Clone, Copy, Debug)]
+pub struct NoQuery;
+
+/// The parts of the address that the route names.
+#[derive(Clone, Copy, Debug)]
+pub struct Address<T>(pub T);
+
+impl<T: DeserializeOwned + PartialSchema> FromRequest<App> for Json<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &App) -> Result<Self, Problem> {
+        let media_type = request
+            .headers()
+            .get(header::CONTENT_TYPE)
+            .and_then(|value| value.to_str().ok());
+        let media_type = media_type
+            .and_then(|value| value.split(';').next())
+            .unwrap_or("")
+            .trim();
+        let is_json =
+            media_type.eq_ignore_ascii_case("application/json") || media_type.ends_with("+json");
+        if !is_json {
+            let detail = format!("The body is of type {media_type:?}.");
+            return Err(
+                Problem::new(Kind::UnsupportedMediaType, detail).accepting("application/json")
+            );
+        }
+        let time = state.config.body_time;
+        let body = tokio::time::timeout(time, Bytes::from_request(request, state))
+            .await
+            .map_err(|_| {
+                let detail = format!("The body did not end in {} seconds.", time.as_secs_f32());
+                Problem::new(Kind::RequestTimeout, detail)
+            })?
+            .map_err(|error| broken_body(&error))?;
+        read_json(&body).map(Self)
+    }
+}
+
+fn broken_body(error: &BytesRejection) -> Problem {
+    if error.status() == StatusCode::PAYLOAD_TOO_LARGE {
+        return Problem::new(Kind::TooLarge, "The JSON in the body is too large.")
+            .accepting(format!("up to {JSON_BYTES} bytes"));
+    }
+    Problem::new(
+        Kind::MalformedRequest,
+        "The body could not be read to its end.",
+    )
+}
+
+fn read_json<T: DeserializeOwned + PartialSchema>(body: &[u8]) -> Result<T, Problem> {
+    let whole = || accepted::in_body::<T>("").unwrap_or_else(|| "an object".to_owned());
+    let malformed = |detail: String| {
+        Problem::new(Kind::MalformedRequest, detail)
+            .at(Place::Body, "")
+            .accepting(format!("JSON: {}", whole()))
+    };
+    if body.iter().all(u8::is_ascii_whitespace) {
+        return Err(malformed("The body is empty.".to_owned()));
+    }
+    let mut reader = serde_json::Deserializer::from_slice(body);
+    let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+        let parent = pointer(error.path());
+        let cause = error.into_inner();
+        let message = cause.to_string();
+        let is_too_large = message.starts_with("number out of range");
+        if !is_too_large && serde_json::from_slice::<IgnoredAny>(body).is_err() {
+            return malformed(format!("The body is not JSON: {cause}."));
+        }
+        let message = message
+            .rsplit_once(" at line ")
+            .map_or(&*message, |(what, _)| what);
+        let pointer = named_field(message)
+            .filter(|_| parent.is_empty())
+            .map_or(parent, |name| format!("/{name}"));
+        let name = match pointer.trim_start_matches('/') {
+            "" => "The body",
+            name => name,
+        };
+        let documented = || accepted::in_body::<T>(&pointer);
+        let (detail, accepted) = if is_too_large {
+            (format!("{name} is a number out of range."), documented())
+        } else if let Some(accepted) = workshop::accepted(message) {
+            (format!("{message}."), Some(accepted.to_owned()))
+        } else if is_about_names(message) {
+            (sentence(message), expected(message))
+        } else {
+            // Told by its value, not by how a reader calls its type.
+            let detail = format!("{name} is {}.", given(body, &pointer));
+            (detail, documented().or_else(|| expected(message)))
+        };
+        let problem = Problem::value(pointer, detail);
+        match accepted {
+            Some(accepted) => problem.accepting(accepted),
+            None => problem,
+        }
+    })?;
+    reader
+        .end()
+        .map_err(|error| malformed(format!("The body is not JSON: {error}.")))?;
+    Ok(value)
+}
+
+/// The value at a pointer as it was sent, no more of it than fits in a line.
+fn given(body: &[u8], pointer: &str) -> String {
+    let body: serde_json::Value = serde_json::from_slice(body).unwrap_or_default();
+    let text = body
+        .pointer(pointer)
+        .map_or("missing".to_owned(), ToString::to_string);
+    match text.char_indices().nth(LONGEST_GIVEN) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text,
+    }
+}
+
+/// What would be accepted, where a reader's message says it: "…, expected one of `a`, `b`".
+fn expected(message: &str) -> Option<String> {
+    if let Some(field) = message.strip_prefix("missing field `") {
+        return field
+            .split_once('`')
+            .map(|(name, _)| format!("an object with the field {name}"));
+    }
+    let (_, rest) = message.rsplit_once(", expected ")?;
+    let what = rest.strip_prefix("one of ").unwrap_or(rest);
+    Some(what.replace('`', ""))
+}
+
+/// Whether a reader's message is about the name of a field or of a choice.
+fn is_about_names(message: &str) -> bool {
+    [
+        "missing field",
+        "unknown field",
+        "duplicate field",
+        "unknown variant",
+    ]
+    .iter()
+    .any(|words| message.starts_with(words))
+}
+
+/// The field that an object lacks or has twice: the reader names it, but does not point at it.
+fn named_field(message: &str) -> Option<String> {
+    let rest = message
+        .strip_prefix("missing field `")
+        .or_else(|| message.strip_prefix("duplicate field `"))?;
+    rest.split_once('`').map(|(name, _)| name.to_owned())
+}
+
+fn sentence(message: &str) -> String {
+    let mut letters = message.chars();
+    letters.next().map_or(String::new(), |first| {
+        format!("{}{}.", first.to_uppercase(), letters.as_str())
+    })
+}
+
+/// RFC 6901.
+fn pointer(path: &serde_path_to_error::Path) -> String {
+    use serde_path_to_error::Segment;
+    path.iter()
+        .map(|segment| match segment {
+            Segment::Seq { index } => format!("/{index}"),
+            Segment::Map { key } => format!("/{}", key.replace('~', "~0").replace('/', "~1")),
+            Segment::Enum { variant } => format!("/{variant}"),
+            Segment::Unknown => String::new(),
+        })
+        .collect()
+}
+
+/// The parameters of a query, none of which has another name than these.
+fn known_pairs(parts: &Parts, names: &[&str]) -> Result<Vec<query::Pair>, Problem> {
+    let pairs = query::pairs(parts.uri.query().unwrap_or(""))?;
+    query::refuse_unknown(&pairs, names)?;
+    Ok(pairs)
+}
+
+fn read_query<T: DeserializeOwned + IntoParams>(pairs: &[query::Pair]) -> Result<T, Problem> {
+    query::read(pairs, accepted::in_query::<T>)
+}
+
+impl<S: Send + Sync, T: DeserializeOwned + IntoParams> FromRequestParts<S> for Query<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        read_query(&known_pairs(parts, query::names::<T>())?).map(Self)
+    }
+}
+
+impl<S, A, B> FromRequestParts<S> for QueryOfTwo<A, B>
+where
+    S: Send + Sync,
+    A: DeserializeOwned + IntoParams,
+    B: DeserializeOwned + IntoParams,
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        let names = [query::names::<A>(), query::names::<B>()].concat();
+        let pairs = known_pairs(parts, &names)?;
+        Ok(Self(read_query(&pairs)?, read_query(&pairs)?))
+    }
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for NoQuery {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        known_pairs(parts, &[]).map(|_| Self)
+    }
+}
+
+impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for Address<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        match Path::from_request_parts(parts, state).await {
+            Ok(Path(address)) => Ok(Self(address)),
+            Err(refused) => {
+                let accepted = expected(&refused.body_text())
+                    .unwrap_or_else(|| "the addresses listed in /openapi.json".to_owned());
+                Err(
+                    Problem::new(Kind::UnknownAddress, "There is nothing at this address.")
+                        .accepting(accepted),
+                )
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::service::Shape;
+    use serde::Deserialize;
+    use utoipa::ToSchema;
+
+    #[derive(Debug, Deserialize, ToSchema)]
+    #[serde(deny_unknown_fields)]
+    struct Order {
+        #[allow(dead_code)] // read by the reader only
+        #[schema(min_items = 2, max_items = 5)]
+        paints: Vec<String>,
+        #[allow(dead_code)] // read by the reader only
+        #[schema(minimum = 1, maximum = 4096)]
+        clusters: Option<u32>,
+        #[allow(dead_code)] // read by the reader only
+        scene: Option<Shape>,
+        #[allow(dead_code)] // read by the reader only
+        size: Option<[u32; 2]>,
+        #[allow(dead_code)] // read by the reader only
+        #[schema(exclusive_minimum = 0.0)]
+        max_error: Option<f64>,
+    }
+
+    #[test]
+    fn a_json_problem_says_what_would_be_accepted() {
+        let cases = [
+            (r#"{"paints": 3}"#, "paints is 3.", "a list of 2 to 5"),
+            (r#"{"paints": ["", 7]}"#, "paints/1 is 7.", "text"),
+            (
+                r#"{"paints": [], "clusters": 1e99}"#,
+                "clusters is 1e+99.",
+                "a whole number from 1 to 4096",
+            ),
+            (
+                r#"{"paints": [], "size": [8, -1]}"#,
+                "size/1 is -1.",
+                "a whole number from 0",
+            ),
+            (
+                r#"{"paints": [], "max_error": 1e999}"#,
+                "max_error is a number out of range.",
+                "a number above 0",
+            ),
+            (
+                r#"{"paints": [], "scene": "cube"}"#,
+                "Unknown variant `cube`, expected one of `sphere`, `capsule`, `panel`.",
+                "sphere, capsule, panel",
+            ),
+            (
+                r#"{"paints": [], "scene": 3}"#,
+                "scene is 3.",
+                "sphere, capsule, panel",
+            ),
+            (
+                r#"{"paints": [], "surprise": 1}"#,
+                "Unknown field `surprise`, expected one of `paints`, `clusters`, `scene`, `size`, `max_error`.",
+                "paints, clusters, scene, size, max_error",
+            ),
+            (
+                r"{}",
+                "Missing field `paints`.",
+                "an object with the field paints",
+            ),
+            (
+                r#""paints""#,
+                "The body is \"paints\".",
+                "an object with paints",
+            ),
+            ("", "The body is empty.", "JSON: an object with paints"),
+        ];
+        for (body, detail, accepted) in cases {
+            let problem = read_json::<Order>(body.as_bytes())
+                .expect_err(body)
+                .document(None);
+            assert_eq!(
+                (problem.detail.as_str(), problem.accepted.as_deref()),
+                (detail, Some(accepted)),
+                "{body}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_json_problem_points_at_the_field() {
+        let cases = [
+            (r#"{"paints": ["a", 3]}"#, 422, "/paints/1"),
+            (r#"{"paints": [], "surprise": 1}"#, 422, "/surprise"),
+            (r#"{"paints": [], "paints": []}"#, 422, "/paints"),
+            (r"{}", 422, "/paints"),
+            (r"[]", 422, ""),
+        ];
+        for (body, status, pointer) in cases {
+            let problem = read_json::<Order>(body.as_bytes())
+                .expect_err(body)
+                .document(None);
+            assert_eq!(
+                (problem.status, problem.pointer.as_deref()),
+                (status, Some(pointer)),
+                "{body}: {problem:?}"
+            );
+        }
+        for body in ["", "{", "[]x", "{\"paints\": []} x", "\u{1}"] {
+            let problem = read_json::<Order>(body.as_bytes()).expect_err(body);
+            assert!(
+                matches!(problem.kind(), Kind::MalformedRequest | Kind::InvalidValue),
+                "{body}: {problem:?}"
+            );
+        }
+    }
+}

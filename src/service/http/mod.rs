@@ -1,0 +1,29 @@
+//! What holds for every request, whatever it is about.
+//!
+//! Each passes the `envelope` (id, time, counts, panics). What it says is read strictly in `extract` and `query`, and
+//! what it prefers in `waiting` and `idempotency`, and an upload comes in through `receiving`; what is wrong with it becomes a problem in `problem`, which says what
+//! is `accepted` instead, and all else an `answer` with an `ETag` and how long it keeps.
+//!
+//! Promised: unknown fields and parameters are refused; nothing internal leaves in an error. Left to others: what a
+//! request is about (`resources`).
+
+mod accepted;
+mod answer;
+mod documented;
+mod envelope;
+mod extract;
+mod idempotency;
+mod kind;
+mod problem;
+mod query;
+pub mod receiving;
+mod waiting;
+
+pub use answer::{Answer, Keep};
+pub use documented::{BlendProblems, JobProblems, PaintProblems, Problems};
+pub use envelope::envelope;
+pub use extract::{Address, JSON_BYTES, Json, NoQuery, Query, QueryOfTwo};
+pub use idempotency::Idempotency;
+pub use kind::Kind;
+pub use problem::{Place, Problem, ProblemDocument};
+pub use waiting::Prefer;

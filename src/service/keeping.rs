@@ -1,0 +1,127 @@
+//! What is kept and what is removed: a record names blobs, and a blob that none names goes.
+
+use super::app::App;
+use super::http::Problem;
+use super::shelf::unknown_paint;
+use crate::paint::PaintFile;
+use crate::store::{BlobBytes, Hash, PaintRecord, Visibility};
+
+impl App {
+    /// Whether a paint has this id.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the store fails.
+    pub async fn has_paint(&self, id: &str) -> Result<bool, Problem> {
+        Ok(self.catalogue.paint(id).await?.is_some())
+    }
+
+    /// Removes blobs that nothing names: what was uploaded in the moment before a crash.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the store fails.
+    pub async fn sweep(&self) -> Result<(), Problem> {
+        let _removing = self.removal.write().await;
+        for blob in self.blobs.all().await? {
+            self.forget_unnamed(blob).await?;
+        }
+        Ok(())
+    }
+
+    /// Keeps a paint under an id. Nothing happens where the id is taken.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the store fails.
+    pub async fn keep_paint(
+        &self,
+        id: &str,
+        file: PaintFile,
+        measurement: Option<Hash>,
+    ) -> Result<(), Problem> {
+        let _writing = self.removal.read().await;
+        let hashed = tokio::task::spawn_blocking(move || {
+            (file.to_bytes(), Hash::from(file.paint.content_hash()), file)
+        });
+        let (bytes, content, file) = hashed.await.map_err(Problem::internal)?;
+        let paint = self.blobs.put(bytes.into()).await?.hash;
+        let record = PaintRecord {
+            id: id.to_owned(),
+            name: file.name,
+            source: file.provenance.source,
+            measurement,
+            paint,
+            content,
+            visibility: Visibility::default(),
+        };
+        self.catalogue.add_paint(&record).await?;
+        Ok(())
+    }
+
+    /// A blob that the record of a paint names, to be streamed.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the paint was deleted a moment ago.
+    pub async fn stream_of(&self, id: &str, blob: Hash) -> Result<BlobBytes, Problem> {
+        // An open blob can be read to its end, whatever becomes of its name.
+        let _reading = self.removal.read().await;
+        match self.blobs.stream(blob).await? {
+            Some(bytes) => Ok(bytes),
+            None if self.catalogue.paint(id).await?.is_none() => Err(unknown_paint(id)),
+            None => Err(Problem::internal(format!("a blob of {id} is not there"))),
+        }
+    }
+
+    /// Forgets a paint and every blob that nothing else names.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when there is none.
+    pub async fn forget_paint(&self, id: &str) -> Result<(), Problem> {
+        let _removing = self.removal.write().await;
+        let gone = self
+            .catalogue
+            .remove_paint(id)
+            .await?
+            .ok_or_else(|| unknown_paint(id))?;
+        self.shelf.invalidate(id).await;
+        for blob in gone.measurement.into_iter().chain([gone.paint]) {
+            self.forget_unnamed(blob).await?;
+        }
+        Ok(())
+    }
+
+    /// Publishes a paint or makes it private.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when there is none.
+    pub async fn show_paint(&self, id: &str, visibility: Visibility) -> Result<(), Problem> {
+        // Nobody reads the record before and shelves it after.
+        let _changing = self.removal.write().await;
+        if !self.catalogue.show_paint(id, visibility).await? {
+            return Err(unknown_paint(id));
+        }
+        self.shelf.invalidate(id).await;
+        Ok(())
+    }
+
+    /// Forgets an upload that came to nothing.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the store fails.
+    pub async fn forget_upload(&self, upload: Hash) -> Result<(), Problem> {
+        let _removing = self.removal.write().await;
+        self.forget_unnamed(upload).await
+    }
+
+    async fn forget_unnamed(&self, blob: Hash) -> Result<(), Problem> {
+        if !self.catalogue.names_blob(blob).await? {
+            self.blobs.remove(blob).await?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,13 @@
+//! What requests for several resources ask for in the same words: accuracy, targets, weights,
+//! views.
+//!
+//! Promised: a refusal names the parameter or the field and what would be accepted. Left to others: what it means
+//! (`accuracy`, `blend`), and what is done with it (`resources`).
+
+mod profile;
+pub mod targets;
+pub mod view;
+mod weights;
+
+pub use profile::{KnobsDocument, ProfileDocument, ProfileText};
+pub use weights::WeightQuery;

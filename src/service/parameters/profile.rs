@@ -1,0 +1,184 @@
+//! Profiles in requests: the name of a preset, knobs as text, or an object of knobs.
+
+use serde::{Deserialize, Deserializer, Serialize};
+use utoipa::ToSchema;
+
+use crate::accuracy::{Knobs, Profile, ProfileError};
+use crate::service::http::Problem;
+use crate::service::shelf::Shelved;
+use crate::service::work::Thing;
+use crate::workshop::check_clusters;
+
+/// What would be accepted in place of a profile that is none.
+const ACCEPTED: &str =
+    "draft, standard, reference, or knobs such as clusters=100 or {\"clusters\": 100}";
+
+/// A profile as it was asked for, and whether its clusters stood beside it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ProfileText(pub Knobs, bool);
+
+impl<'de> Deserialize<'de> for ProfileText {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Knobs::of_name_or_object(deserializer).map(|knobs| Self(knobs, false))
+    }
+}
+
+/// An accuracy profile: a preset's name, or knobs beside a preset.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+#[schema(example = "standard")]
+#[allow(dead_code)] // says what is accepted
+pub enum ProfileDocument {
+    /// `draft`, `standard` or `reference`; knobs may follow, separated by commas: `standard,clusters=100`.
+    #[schema(title = "Name")]
+    Name(String),
+    /// Knobs.
+    #[schema(title = "Knobs")]
+    Knobs(KnobsDocument),
+}
+
+/// Knobs of a profile. What is left out stays as the preset has it.
+#[derive(Debug, Serialize, ToSchema)]
+#[allow(dead_code)] // says what is accepted
+pub struct KnobsDocument {
+    /// Where the other knobs stand: `draft`, `standard` or `reference`; `standard` unless given.
+    preset: Option<String>,
+    /// Most clusters of a flake slice. Paints are clustered when they are uploaded.
+    #[schema(minimum = 1, maximum = 4096)]
+    clusters: Option<u32>,
+    /// Box of a cluster: `moments` or `tight`.
+    box_rule: Option<String>,
+    /// Every so many-th measured angle is used.
+    #[schema(minimum = 1, maximum = 16)]
+    angle_step: Option<u32>,
+    /// Solver of each slice: `exact`, `sinkhorn` or `greedy`.
+    transport: Option<String>,
+    /// Smoothing of `sinkhorn`, as a part of the mean cost.
+    #[schema(minimum = 1e-6, maximum = 10.0)]
+    epsilon: Option<f64>,
+    /// Cost of moving a color: `distance` in Lab, or `squared`.
+    cost: Option<String>,
+    /// Order in which more than two paints are joined: `canonical` or `cheapest`.
+    order: Option<String>,
+    /// Precision of textures: `f32`, `f16` or `8bit`.
+    precision: Option<String>,
+    /// How a bundle's flakes can be drawn: `alias`, `inverse_cdf` or `both`.
+    draw: Option<String>,
+    /// Samples per pixel of a picture.
+    #[schema(minimum = 1, maximum = 4096)]
+    samples_per_pixel: Option<u32>,
+}
+
+impl ProfileText {
+    /// The same with clusters that stand beside it.
+    #[must_use]
+    pub fn with_clusters(self, clusters: Option<u32>) -> Self {
+        let knobs = Knobs {
+            clusters: clusters.or(self.0.clusters),
+            ..self.0
+        };
+        Self(knobs, clusters.is_some())
+    }
+
+    /// The profile, asked for in a query.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] that names the parameter and what would be accepted.
+    pub fn of_query(&self) -> Result<Profile, Problem> {
+        self.0.profile().map_err(|error| {
+            let parameter = match error.knob() {
+                Some("clusters") if self.1 => "clusters",
+                _ => "profile",
+            };
+            accepting(Problem::parameter(parameter, sentence(&error)), &error)
+        })
+    }
+
+    /// Refuses clusters that a paint or a blend does not have: paints are clustered when they are uploaded.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] that names the parameter.
+    pub fn fits(&self, thing: &Shelved) -> Result<(), Problem> {
+        let Some(wanted) = self.0.clusters else {
+            return Ok(());
+        };
+        let (fits, accepted) = match &thing.thing {
+            Thing::Paint(paint) => (
+                check_clusters(&thing.id, paint, wanted as usize).is_ok(),
+                "a profile without clusters, or a paint uploaded with so many",
+            ),
+            Thing::Blend(_) => (
+                false,
+                "a profile without clusters, or a blend of paints uploaded with so many",
+            ),
+        };
+        let detail = format!("{} has the clusters that it has, not {wanted}.", thing.id);
+        let problem = || Problem::parameter("profile", detail).accepting(accepted);
+        fits.then_some(()).ok_or_else(problem)
+    }
+
+    /// The profile, asked for in a JSON body.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] that points at the field and says what would be accepted.
+    pub fn of_body(&self) -> Result<Profile, Problem> {
+        self.0.profile().map_err(|error| {
+            let pointer = match error.knob() {
+                Some("clusters") if self.1 => "/clusters".to_owned(),
+                Some(knob) => format!("/profile/{knob}"),
+                None => "/profile".to_owned(),
+            };
+            accepting(Problem::value(pointer, sentence(&error)), &error)
+        })
+    }
+}
+
+fn sentence(error: &ProfileError) -> String {
+    match error {
+        ProfileError::Range { knob, value, .. } => format!("{knob} is {value}."),
+        error => format!("{error}."),
+    }
+}
+
+fn accepting(problem: Problem, error: &ProfileError) -> Problem {
+    problem.accepting(match error {
+        ProfileError::Range { accepted, .. } => (*accepted).to_owned(),
+        _ => ACCEPTED.to_owned(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use utoipa::PartialSchema;
+
+    #[test]
+    fn the_interface_documents_every_knob_and_no_other() {
+        let schema = serde_json::to_value(KnobsDocument::schema()).expect("serialises");
+        let mut documented: Vec<&str> = schema["properties"]
+            .as_object()
+            .expect("an object")
+            .keys()
+            .map(String::as_str)
+            .collect();
+        documented.sort_unstable();
+        let all: Knobs = "preset=draft,transport=sinkhorn,epsilon=0.5"
+            .parse()
+            .expect("knobs");
+        let knobs = Knobs::of(&all.profile().expect("a profile"))
+            .over(&all)
+            .expect("knobs");
+        let knobs = serde_json::to_value(knobs).expect("serialises");
+        let mut there: Vec<&str> = knobs
+            .as_object()
+            .expect("an object")
+            .keys()
+            .map(String::as_str)
+            .collect();
+        there.sort_unstable();
+        assert_eq!(documented, there);
+    }
+}

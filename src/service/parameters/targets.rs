@@ -1,0 +1,94 @@
+//! Targets in requests, and what was picked for them in answers.
+//!
+//! `Carpaint-Target` says whether the target is met, with which profile, and what was estimated: it depends on the
+//! machine, so it stands in a header and never in the bytes of a result.
+
+use axum::http::{HeaderName, HeaderValue};
+use axum::response::Response;
+
+use crate::service::http::{Answer, Problem};
+use crate::service::work::{Picked, Target, WorkError};
+
+const TARGET: HeaderName = HeaderName::from_static("carpaint-target");
+
+/// A target in a query.
+///
+/// # Errors
+///
+/// [`Problem`] for a limit that is not above 0, or one beside knobs.
+pub fn of_query(
+    max_error: Option<f64>,
+    max_seconds: Option<f64>,
+    knobs: bool,
+) -> Result<Target, Problem> {
+    let target = checked(max_error, max_seconds, WorkError::of_query)?;
+    match (target.is_some() && knobs, field(&target)) {
+        (true, field) => Err(Problem::parameter(field, beside(field)).accepting(EITHER)),
+        _ => Ok(target),
+    }
+}
+
+/// A target in a JSON body.
+///
+/// # Errors
+///
+/// [`Problem`] for a limit that is not above 0, or one beside knobs.
+pub fn of_body(
+    max_error: Option<f64>,
+    max_seconds: Option<f64>,
+    knobs: bool,
+) -> Result<Target, Problem> {
+    let target = checked(max_error, max_seconds, WorkError::of_body)?;
+    match (target.is_some() && knobs, field(&target)) {
+        (true, field) => Err(Problem::value(format!("/{field}"), beside(field)).accepting(EITHER)),
+        _ => Ok(target),
+    }
+}
+
+const EITHER: &str = "a target or knobs, not both";
+
+fn beside(field: &str) -> String {
+    format!("{field} stands beside knobs.")
+}
+
+fn field(target: &Target) -> &'static str {
+    if target.max_error.is_some() {
+        "max_error"
+    } else {
+        "max_seconds"
+    }
+}
+
+fn checked(
+    max_error: Option<f64>,
+    max_seconds: Option<f64>,
+    problem: impl FnOnce(WorkError) -> Problem,
+) -> Result<Target, Problem> {
+    let target = Target {
+        max_error,
+        max_seconds,
+    };
+    target
+        .check()
+        .map(|()| target)
+        .map_err(|error| problem(error.into()))
+}
+
+/// A response that says what was picked.
+pub fn told(mut response: Response, picked: Option<&Picked>) -> Response {
+    if let Some(value) = picked.and_then(|p| HeaderValue::from_str(&p.line()).ok()) {
+        response.headers_mut().insert(TARGET, value);
+    }
+    response
+}
+
+impl Answer {
+    /// With what was picked for a target.
+    #[must_use]
+    pub fn picked(self, picked: Option<&Picked>) -> Self {
+        match picked {
+            Some(picked) => self.header(TARGET, &picked.line()),
+            None => self,
+        }
+    }
+}

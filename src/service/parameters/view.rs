@@ -1,0 +1,230 @@
+//! What a picture shows, in a query or in a body: scene, size, samples, lights.
+
+use std::str::FromStr;
+use std::sync::Arc;
+
+use serde::{Deserialize, Deserializer};
+use utoipa::{IntoParams, ToSchema};
+
+use super::profile::ProfileText;
+use super::targets;
+use crate::blend::RealisationWeights;
+use crate::service::app::App;
+use crate::service::http::{Place, Problem};
+use crate::service::shelf::Shelved;
+use crate::service::work::{Asked, Light, Picked, PictureFormat, Shape, View, WorkError};
+
+/// Longest side of a picture.
+const LONGEST_SIDE: u32 = 4096;
+
+/// Most samples of one picture: pixels times samples per pixel.
+const MOST_SAMPLES: u64 = 1 << 28;
+
+/// Most lights of a scene.
+const MOST_LIGHTS: usize = 16;
+
+/// What a picture shows.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ViewQuery {
+    /// What the paint is on, `sphere` unless given.
+    scene: Option<Shape>,
+    /// Width and height in pixels, `512x512` unless given.
+    #[param(value_type = Option<String>, pattern = "^[0-9]{1,4}x[0-9]{1,4}$", example = "512x512")]
+    size: Option<Size>,
+    /// Samples per pixel, in place of the profile's.
+    #[param(minimum = 1, maximum = 4096)]
+    spp: Option<u32>,
+    /// Direction towards the light, in place of the scene's usual one: x to the right, y up, z towards the viewer.
+    #[param(style = Form, explode = false, min_items = 3, max_items = 3)]
+    light: Option<Vec<f32>>,
+    /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `draft,samples_per_pixel=100`.
+    #[param(value_type = Option<String>, example = "standard")]
+    profile: Option<ProfileText>,
+    /// In place of a profile: the cheapest whose mean error by sampling is at most this, CIEDE2000.
+    #[param(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[param(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
+}
+
+/// Pixels across or down.
+#[derive(ToSchema)]
+#[schema(minimum = 1, maximum = 4096)]
+#[allow(dead_code)] // says what is accepted
+pub struct Side(u32);
+
+/// `WxH` in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Size([u32; 2]);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let side = |side: &str| {
+            side.parse()
+                .ok()
+                .filter(|pixels| (1..=LONGEST_SIDE).contains(pixels))
+        };
+        text.split_once('x')
+            .and_then(|(width, height)| Some(Self([side(width)?, side(height)?])))
+            .ok_or_else(|| format!("{text:?} is no size; accepted is WxH such as 512x512, up to {LONGEST_SIDE} each."))
+    }
+}
+
+impl<'de> Deserialize<'de> for Size {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?
+            .parse()
+            .map_err(serde::de::Error::custom)
+    }
+}
+
+impl ViewQuery {
+    fn view(&self, app: &App) -> Result<View, Problem> {
+        let Size(size) = self.size.unwrap_or(Size([512, 512]));
+        let profile = self.profile.clone().unwrap_or_default().of_query()?;
+        let light = self.light.as_deref().map(|list| {
+            <[f32; 3]>::try_from(list)
+                .map(|towards| Light {
+                    towards,
+                    irradiance: None,
+                })
+                .map_err(|_| {
+                    let detail = format!("light has {} numbers.", list.len());
+                    Problem::parameter("light", detail)
+                        .accepting("3 numbers, the direction towards the light")
+                })
+        });
+        let asked = View {
+            scene: self.scene.unwrap_or_default(),
+            size,
+            samples_per_pixel: self.spp.unwrap_or(profile.samples_per_pixel),
+            lights: light.transpose()?.map(|light| vec![light]),
+        };
+        view(app, asked, &Names::QUERY)
+    }
+}
+
+impl ViewQuery {
+    /// The view, with the samples that meet a target where there is one.
+    pub async fn picked_view(
+        &self,
+        app: &App,
+        thing: &Arc<Shelved>,
+        weights: Option<&RealisationWeights>,
+        format: PictureFormat,
+    ) -> Result<(View, Option<Picked>), Problem> {
+        if let Some(asked) = &self.profile {
+            asked.fits(thing)?;
+        }
+        let mut view = self.view(app)?;
+        let knobs = self.profile.is_some() || self.spp.is_some();
+        let target = targets::of_query(self.max_error, self.max_seconds, knobs)?;
+        if !target.is_some() {
+            return Ok((view, None));
+        }
+        let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(thing), weights.cloned());
+        let wanted = view.clone();
+        let found = app.bench.run(move || {
+            let asked = Asked::Preview {
+                thing: &thing.thing,
+                weights: weights.as_ref(),
+                view: &wanted,
+                format,
+            };
+            works.pick(&asked, &target)
+        });
+        let found = found.await?.map_err(WorkError::of_query)?;
+        view.samples_per_pixel = found.profile().samples_per_pixel;
+        Ok((view, Some(found)))
+    }
+}
+
+/// How a request calls what makes a view.
+pub struct Names {
+    place: Place,
+    samples: &'static str,
+    /// The light of a query, or the list that lights stand in.
+    light: &'static str,
+}
+
+impl Names {
+    /// In a query.
+    pub const QUERY: Self = Self {
+        place: Place::Query,
+        samples: "spp",
+        light: "light",
+    };
+    /// In a JSON body.
+    pub const BODY: Self = Self {
+        place: Place::Body,
+        samples: "samples_per_pixel",
+        light: "lights",
+    };
+
+    fn refuse(&self, name: &str, detail: String, accepted: String) -> Problem {
+        let problem = match self.place {
+            Place::Body => Problem::value(format!("/{name}"), detail),
+            _ => Problem::parameter(name, detail),
+        };
+        problem.accepting(accepted)
+    }
+
+    fn light(&self, place: usize) -> String {
+        match self.place {
+            Place::Body => format!("{}/{place}", self.light),
+            _ => self.light.to_owned(),
+        }
+    }
+}
+
+/// A view, with everything in range.
+pub fn view(app: &App, view: View, names: &Names) -> Result<View, Problem> {
+    let (most, spp) = (app.config.limits.samples, view.samples_per_pixel);
+    let [width, height] = view.size;
+    let size = format!("{width}x{height}");
+    if !(1..=most).contains(&spp) {
+        let detail = format!("{} is {spp}.", names.samples);
+        return Err(names.refuse(names.samples, detail, format!("1 to {most}")));
+    }
+    if !view
+        .size
+        .iter()
+        .all(|side| (1..=LONGEST_SIDE).contains(side))
+    {
+        let accepted = format!("1 to {LONGEST_SIDE} each");
+        return Err(names.refuse("size", format!("size is {size}."), accepted));
+    }
+    if u64::from(width) * u64::from(height) * u64::from(spp) > MOST_SAMPLES {
+        let detail = format!("{} is {spp} for each of {size} pixels.", names.samples);
+        let accepted = format!("up to {MOST_SAMPLES} samples in all");
+        return Err(names.refuse(names.samples, detail, accepted));
+    }
+    let lights = view.lights.as_deref().unwrap_or_default();
+    if lights.len() > MOST_LIGHTS {
+        let detail = format!("{} has {} lights.", names.light, lights.len());
+        return Err(names.refuse(names.light, detail, format!("up to {MOST_LIGHTS} lights")));
+    }
+    for (place, light) in lights.iter().enumerate() {
+        let length: f32 = light.towards.iter().map(|v| v * v).sum();
+        let bright = light.irradiance.unwrap_or_default();
+        let dim = bright.iter().all(|v| (0.0..=65504.0).contains(v));
+        if !(length > 0.0 && length.is_finite() && dim) {
+            let name = names.light(place);
+            let towards = light.towards;
+            let detail = match light.irradiance {
+                Some(irradiance) => {
+                    format!("{name} is towards {towards:?} with irradiance {irradiance:?}.")
+                }
+                None => format!("{name} is towards {towards:?}."),
+            };
+            let accepted =
+                "a direction of some length, and an irradiance of 0 to 65504 per channel";
+            return Err(names.refuse(&name, detail, accepted.to_owned()));
+        }
+    }
+    Ok(view)
+}

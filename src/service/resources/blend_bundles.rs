@@ -1,0 +1,70 @@
+//! The bundle of a whole blend: one request, and then sliders move without any.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::extract::State;
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use crate::service::app::App;
+use crate::service::http::{Address, Answer, BlendProblems, Keep, Problem, Query};
+use crate::service::ids;
+use crate::service::parameters::ProfileText;
+use crate::service::work::WorkError;
+
+/// How accurately a bundle is written.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct BundleQuery {
+    /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,precision=f32`.
+    #[param(value_type = Option<String>, example = "standard")]
+    profile: Option<ProfileText>,
+}
+
+/// All paints of a blend in one archive.
+///
+/// A texture bundle whose shader mixes the paints: `blendAt` of the archive's `carpaint.js` gives the paint at any weights
+/// within milliseconds, so that users move sliders without a request each. One realisation at fixed weights is
+/// `realisation.zip`.
+#[utoipa::path(
+    get, operation_id = "bundle_blend", path = "/v1/blends/{id}/bundle.zip", tag = "blends",
+    params(("id" = String, Path, description = "Blend"), BundleQuery),
+    responses(
+        (status = 200, description = "The archive", content((Vec<u8> = "application/zip"))),
+        BlendProblems,
+    )
+)]
+pub async fn bundle(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    Query(query): Query<BundleQuery>,
+) -> Result<Answer, Problem> {
+    let begun = Instant::now();
+    let blend = app.blend(&id).await?;
+    let asked = query.profile.unwrap_or_default();
+    asked.fits(&blend)?;
+    let profile = asked.of_query()?;
+    let key = ids::key(
+        "blend_bundle",
+        &(&blend.id, blend.file.to_string(), profile.export),
+    );
+    let name = format!("{}.zip", blend.id);
+    let on = app.clone();
+    let compute = move || async move {
+        let (works, counter) = (
+            Arc::clone(&on.works),
+            on.metrics.blend_bundles_computed.clone(),
+        );
+        let made = on
+            .bench
+            .run(move || works.bundle(&blend.thing, &profile))
+            .await?;
+        let bytes = made.map_err(WorkError::of_query)?;
+        counter.increment(1);
+        Ok(bytes.into())
+    };
+    let result = app.results.get_or_compute(key, compute).await?;
+    let answer = Answer::result("application/zip", result, Keep::ForEver).saved_as(&name);
+    Ok(answer.stage("bundle", begun.elapsed()))
+}

@@ -1,0 +1,315 @@
+//! Estimates: what a request will take and how accurate it will be, before it is made.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use crate::accuracy::Profile;
+use crate::blend::RealisationWeights;
+use crate::paint::PaintFile;
+use crate::service::app::App;
+use crate::service::http::{Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument, Problems};
+use crate::service::parameters::view::{self, Side};
+use crate::service::parameters::{ProfileDocument, ProfileText, targets};
+use crate::service::shelf::Shelved;
+use crate::service::work::{
+    Asked, Estimate, Format, IngestOrder, PictureFormat, Shape, View, WorkError,
+};
+use crate::store::LocalBlob;
+
+/// Work to estimate.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EstimateOrder {
+    /// `ingest` (again, of a paint that was uploaded as a measurement), `blend`, `realise` or `preview`.
+    work: WorkName,
+    /// Id of the paint to ingest again, or to write or draw.
+    paint: Option<String>,
+    /// Id of the blend to write or draw.
+    blend: Option<String>,
+    /// Ids of the paints to blend.
+    paints: Option<Vec<String>>,
+    /// Weights of a blend, in the order of its paints; even unless given.
+    weights: Option<Vec<f64>>,
+    /// File to write, `zip` unless given.
+    format: Option<Format>,
+    /// What the paint is on, `sphere` unless given.
+    scene: Option<Shape>,
+    /// Pixels across and down of a picture, 512 each unless given.
+    #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
+    size: Option<[u32; 2]>,
+    /// Accuracy: the name of a preset, or an object of knobs.
+    #[schema(value_type = Option<ProfileDocument>)]
+    profile: Option<ProfileText>,
+    /// In place of a profile: the cheapest whose error is at most this.
+    #[schema(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[schema(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
+}
+
+/// Kinds of work.
+#[derive(Clone, Copy, Debug, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WorkName {
+    /// A measurement becomes a paint.
+    Ingest,
+    /// Paints become a blend.
+    Blend,
+    /// A paint or blend becomes a file.
+    Realise,
+    /// A paint or blend becomes a picture.
+    Preview,
+}
+
+/// What a request will take.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct EstimateDocument {
+    /// Name of the profile.
+    profile: &'static str,
+    /// Its knobs.
+    #[schema(value_type = Object)]
+    knobs: Profile,
+    /// Wall time on this machine as it is now, seconds.
+    seconds: f64,
+    /// The same by stage: `stage` and `seconds`.
+    #[schema(value_type = Vec<Object>)]
+    stages: Value,
+    /// Size of the answer, or of what is kept of it.
+    bytes: u64,
+    /// How far the answer is from the reference profile's: `value` and its `unit`, Lab or CIEDE2000.
+    #[schema(value_type = Object)]
+    error: Value,
+    /// Of a target, whether it is met; if not, the estimate is of the best that can be done.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    met: Option<bool>,
+}
+
+/// What is needed to estimate.
+enum Needed {
+    Ingest(LocalBlob),
+    Blend(Vec<Arc<Shelved>>),
+    Thing(Arc<Shelved>, Option<RealisationWeights>),
+}
+
+/// Estimate a request.
+///
+/// A small part of the work is done, here and now, and the rest is reckoned from it; nothing is kept. With `max_error`
+/// or `max_seconds` the answer says which profile would be picked.
+#[utoipa::path(
+    post, operation_id = "create_estimate", path = "/v1/estimates", tag = "accuracy",
+    request_body = EstimateOrder,
+    responses(
+        (status = 200, description = "Seconds, bytes and error", body = EstimateDocument),
+        (status = 422, description = "Work that would be refused", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
+    )
+)]
+pub async fn create(
+    State(app): State<App>,
+    _: NoQuery,
+    Json(order): Json<EstimateOrder>,
+) -> Result<Answer, Problem> {
+    let target = targets::of_body(order.max_error, order.max_seconds, order.profile.is_some())?;
+    let profile = order.profile.clone().unwrap_or_default().of_body()?;
+    order.refuse_beside_the_point()?;
+    if let WorkName::Preview = order.work {
+        view::view(&app, order.view(&profile), &view::Names::BODY)?;
+    }
+    let needed = order.needed(&app).await?;
+    let works = Arc::clone(&app.works);
+    let estimated = app.bench.run(move || {
+        order.with_asked(&needed, &profile, |asked| {
+            if target.is_some() {
+                let picked = works.pick(asked, &target)?;
+                Ok((picked.estimate, Some(picked.met)))
+            } else {
+                works.estimate(asked, &profile).map(|made| (made, None))
+            }
+        })
+    });
+    let (estimate, met) = estimated.await?.map_err(WorkError::of_body)?;
+    Ok(Answer::json(
+        &EstimateDocument::of(&estimate, met),
+        Keep::Never,
+    ))
+}
+
+impl EstimateDocument {
+    fn of(estimate: &Estimate, met: Option<bool>) -> Self {
+        Self {
+            profile: estimate.profile,
+            knobs: estimate.knobs,
+            seconds: estimate.seconds,
+            stages: serde_json::to_value(&estimate.stages).unwrap_or_default(),
+            bytes: estimate.bytes,
+            error: serde_json::to_value(estimate.error).unwrap_or_default(),
+            met,
+        }
+    }
+}
+
+impl EstimateOrder {
+    /// A field that the work does not have would be an answer to another question.
+    fn refuse_beside_the_point(&self) -> Result<(), Problem> {
+        let given = [
+            ("paint", self.paint.is_some()),
+            ("blend", self.blend.is_some()),
+            ("paints", self.paints.is_some()),
+            ("weights", self.weights.is_some()),
+            ("format", self.format.is_some()),
+            ("scene", self.scene.is_some()),
+            ("size", self.size.is_some()),
+        ];
+        let (work, taken): (_, &[&str]) = match (self.work, &self.blend) {
+            (WorkName::Ingest, _) => ("ingest", &["paint"]),
+            (WorkName::Blend, _) => ("blend", &["paints"]),
+            (WorkName::Realise, None) => ("realise, of a paint,", &["paint", "format"]),
+            (WorkName::Realise, Some(_)) => ("realise", &["paint", "blend", "weights", "format"]),
+            (WorkName::Preview, None) => ("preview, of a paint,", &["paint", "scene", "size"]),
+            (WorkName::Preview, Some(_)) => {
+                ("preview", &["paint", "blend", "weights", "scene", "size"])
+            }
+        };
+        match given.iter().find(|(name, is)| *is && !taken.contains(name)) {
+            Some((name, _)) => Err(Problem::value(
+                format!("/{name}"),
+                format!("The work {work} takes no {name}."),
+            )
+            .accepting(taken.join(", "))),
+            None => Ok(()),
+        }
+    }
+
+    fn view(&self, profile: &Profile) -> View {
+        View {
+            scene: self.scene.unwrap_or_default(),
+            size: self.size.unwrap_or([512; 2]),
+            samples_per_pixel: profile.samples_per_pixel,
+            lights: None,
+        }
+    }
+
+    async fn needed(&self, app: &App) -> Result<Needed, Problem> {
+        match self.work {
+            WorkName::Ingest => {
+                let id = self.paint.as_deref();
+                let id = id.ok_or_else(|| missing("paint").accepting("the id of a paint"))?;
+                let paint = of_field(app.paint(id).await, "/paint")?;
+                let none = || {
+                    Problem::new(
+                        Kind::NoMeasurement,
+                        "This paint was not uploaded as a measurement.",
+                    )
+                };
+                let upload = paint.measurement.ok_or_else(none)?;
+                let local = app.blobs.local(upload).await?;
+                let gone = || Problem::internal(format!("upload {upload} is not there"));
+                Ok(Needed::Ingest(local.ok_or_else(gone)?))
+            }
+            WorkName::Blend => {
+                let most = app.config.limits.paints;
+                let accepted = format!("2 to {most} ids of paints");
+                let ids = self.paints.as_deref();
+                let ids = ids.ok_or_else(|| missing("paints").accepting(&accepted))?;
+                if !(2..=most).contains(&ids.len()) {
+                    let detail = format!("{} paints are to be blended.", ids.len());
+                    return Err(Problem::value("/paints", detail).accepting(accepted));
+                }
+                let mut paints = Vec::with_capacity(ids.len());
+                for (place, id) in ids.iter().enumerate() {
+                    let pointer = format!("/paints/{place}");
+                    paints.push(of_field(app.paint(id).await, &pointer)?);
+                }
+                Ok(Needed::Blend(paints))
+            }
+            WorkName::Realise | WorkName::Preview => match (&self.paint, &self.blend) {
+                (Some(id), None) => {
+                    if self.weights.is_some() {
+                        let problem = Problem::value("/weights", "One paint takes no weights.");
+                        return Err(problem.accepting("nothing"));
+                    }
+                    let paint = of_field(app.paint(id).await, "/paint")?;
+                    Ok(Needed::Thing(paint, None))
+                }
+                (None, Some(id)) => {
+                    let blend = of_field(app.blend(id).await, "/blend")?;
+                    let weights = self.weights_for(blend.names.len())?;
+                    Ok(Needed::Thing(blend, Some(weights)))
+                }
+                _ => Err(missing("paint").accepting("either paint or blend")),
+            },
+        }
+    }
+
+    fn weights_for(&self, paints: usize) -> Result<RealisationWeights, Problem> {
+        let even = || vec![1.0 / paints as f64; paints];
+        let weights = self.weights.clone().unwrap_or_else(even);
+        if weights.len() != paints {
+            let detail = format!("{} weights for {paints} paints.", weights.len());
+            return Err(Problem::value("/weights", detail).accepting(format!("{paints} numbers")));
+        }
+        Ok(RealisationWeights::even(weights))
+    }
+
+    fn with_asked<T>(
+        &self,
+        needed: &Needed,
+        profile: &Profile,
+        then: impl FnOnce(&Asked<'_>) -> T,
+    ) -> T {
+        match needed {
+            Needed::Ingest(local) => {
+                let order = IngestOrder {
+                    profile: *profile,
+                    ..IngestOrder::default()
+                };
+                then(&Asked::Ingest {
+                    upload: local.path(),
+                    order: &order,
+                })
+            }
+            Needed::Blend(shelved) => {
+                let paints: Vec<&PaintFile> =
+                    shelved.iter().filter_map(|p| p.file_of_paint()).collect();
+                then(&Asked::Blend { paints: &paints })
+            }
+            Needed::Thing(shelved, weights) => {
+                let (thing, weights) = (&shelved.thing, weights.as_ref());
+                if let WorkName::Realise = self.work {
+                    let format = self.format.unwrap_or(Format::Zip);
+                    return then(&Asked::Realise {
+                        thing,
+                        weights,
+                        format,
+                    });
+                }
+                then(&Asked::Preview {
+                    thing,
+                    weights,
+                    view: &self.view(profile),
+                    format: PictureFormat::Png,
+                })
+            }
+        }
+    }
+}
+
+fn missing(field: &str) -> Problem {
+    Problem::value(format!("/{field}"), format!("{field} is missing."))
+}
+
+/// A paint or blend that is named in a body: when there is none, the body is wrong.
+fn of_field(found: Result<Arc<Shelved>, Problem>, pointer: &str) -> Result<Arc<Shelved>, Problem> {
+    found.map_err(|problem| match problem.kind() {
+        Kind::UnknownPaint | Kind::UnknownBlend => {
+            Problem::value(pointer.to_owned(), "There is none of this id.")
+                .accepting("an id that was answered before")
+        }
+        _ => problem,
+    })
+}

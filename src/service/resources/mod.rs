@@ -1,0 +1,21 @@
+//! One file per resource: what can be asked of it, and what is answered.
+//!
+//! Promised: a handler reads its request, has the work done and answers; `docs` documents every one of them. Left to
+//! others: how requests are read and answers written (`http`), where they compute and how jobs run (`work`).
+
+pub mod accuracy;
+pub mod blend_bundles;
+pub mod blends;
+pub mod docs;
+pub mod documents;
+pub mod estimates;
+pub mod home;
+pub mod jobs;
+mod making;
+pub mod operations;
+pub mod paints;
+pub mod previews;
+pub mod readings;
+pub mod realisations;
+pub mod uploads;
+pub mod visibility;

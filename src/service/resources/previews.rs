@@ -1,0 +1,250 @@
+//! Previews: pictures of a paint, or of a blend at some weights.
+
+use std::sync::Arc;
+
+use axum::extract::{RawQuery, State};
+use axum::http::{HeaderName, header};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::blend::RealisationWeights;
+use crate::service::app::App;
+use crate::service::http::{
+    Address, Answer, BlendProblems, Idempotency, Json, Keep, Kind, NoQuery, PaintProblems, Problem,
+    ProblemDocument, Problems, Query, QueryOfTwo,
+};
+use crate::service::parameters::view::{self, Side, ViewQuery};
+use crate::service::parameters::{ProfileDocument, ProfileText, WeightQuery};
+use crate::service::shelf::Shelved;
+use crate::service::work::drawing::{self, Drawn};
+use crate::service::work::{Light, Picked, PictureFormat, Shape, View};
+
+/// What is sent of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PreviewFormat {
+    /// Tone mapped for a screen, 8 bits.
+    Png,
+    /// Linear light.
+    Exr,
+    /// The report on the picture: what was drawn and what left out and why, what had to be clamped, how accurate it is.
+    Json,
+}
+
+impl PreviewFormat {
+    /// The picture that is drawn for it.
+    const fn drawn(self) -> PictureFormat {
+        match self {
+            Self::Png | Self::Json => PictureFormat::Png,
+            Self::Exr => PictureFormat::Exr,
+        }
+    }
+}
+
+/// A picture of a blend at some weights.
+///
+/// `json` is the report on the picture: effects that were planned or left out, what was clamped, how accurate it is.
+#[utoipa::path(
+    get, operation_id = "preview_blend", path = "/v1/blends/{id}/preview.{format}", tag = "previews",
+    params(("id" = String, Path, description = "Blend"), ("format" = PreviewFormat, Path, description = "Picture, or its report"), WeightQuery, ViewQuery),
+    responses(
+        (status = 200, description = "The picture", headers(
+            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab"),
+            ("Link" = String, description = "The picture's report")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
+        (status = 400, description = "Weights that do not fit the blend, or a view that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
+        BlendProblems,
+    )
+)]
+pub async fn of_blend(
+    State(app): State<App>,
+    Address((id, format)): Address<(String, PreviewFormat)>,
+    QueryOfTwo(weights, query): QueryOfTwo<WeightQuery, ViewQuery>,
+    RawQuery(raw): RawQuery,
+) -> Result<Answer, Problem> {
+    let blend = app.blend(&id).await?;
+    let weights = weights.for_blend(&blend.names)?;
+    let report = report_link(&format!("/v1/blends/{id}"), raw.as_deref());
+    let answer = drawn(&app, blend, Some(weights), &query, format).await?;
+    Ok(answer.header(header::LINK, &report))
+}
+
+/// A picture of a paint.
+///
+/// `json` is the report on the picture: effects that were planned or left out, how accurate it is.
+#[utoipa::path(
+    get, operation_id = "preview_paint", path = "/v1/paints/{id}/preview.{format}", tag = "previews",
+    params(("id" = String, Path, description = "Paint"), ("format" = PreviewFormat, Path, description = "Picture, or its report"), ViewQuery),
+    responses(
+        (status = 200, description = "The picture", headers(
+            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab"),
+            ("Link" = String, description = "The picture's report")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
+        PaintProblems,
+    )
+)]
+pub async fn of_paint(
+    State(app): State<App>,
+    Address((id, format)): Address<(String, PreviewFormat)>,
+    Query(query): Query<ViewQuery>,
+    RawQuery(raw): RawQuery,
+) -> Result<Answer, Problem> {
+    let paint = app.paint(&id).await?;
+    let report = report_link(&format!("/v1/paints/{id}"), raw.as_deref());
+    let answer = drawn(&app, paint, None, &query, format).await?;
+    Ok(answer.header(header::LINK, &report))
+}
+
+async fn drawn(
+    app: &App,
+    thing: Arc<Shelved>,
+    weights: Option<RealisationWeights>,
+    query: &ViewQuery,
+    format: PreviewFormat,
+) -> Result<Answer, Problem> {
+    let view = query.picked_view(app, &thing, weights.as_ref(), format.drawn());
+    let (view, picked) = view.await?;
+    let drawn = drawing::draw(app, thing, weights, format.drawn(), view).await?;
+    Ok(answer(drawn, format, picked.as_ref()))
+}
+
+/// A whole scene.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PreviewOrder {
+    /// Id of a paint. Either this or `blend`.
+    paint: Option<String>,
+    /// Id of a blend, with weights.
+    blend: Option<String>,
+    /// One weight per paint of the blend.
+    weights: Option<Vec<f64>>,
+    /// Weights of coat, diffuse, lobes and color table alone.
+    base: Option<Vec<f64>>,
+    /// Weights of the flakes' lightness, grain and lifetime alone.
+    flake_lightness: Option<Vec<f64>>,
+    /// Weights of the flakes' color alone.
+    flake_color: Option<Vec<f64>>,
+    /// Factor on the flakes' color: 0 makes them white, 1 leaves them.
+    flake_saturation: Option<f64>,
+    /// What the paint is on, `sphere` unless given.
+    scene: Option<Shape>,
+    /// Width and height in pixels, 512 and 512 unless given.
+    #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
+    size: Option<[u32; 2]>,
+    /// Samples per pixel, in place of the profile's.
+    #[schema(minimum = 1, maximum = 4096)]
+    samples_per_pixel: Option<u32>,
+    /// Lights in place of the scene's usual one; none leaves the surroundings alone.
+    #[schema(max_items = 16)]
+    lights: Option<Vec<Light>>,
+    /// Accuracy: the name of a preset, or an object of knobs.
+    #[schema(value_type = Option<ProfileDocument>)]
+    profile: Option<ProfileText>,
+    /// What is sent, `png` unless given.
+    format: Option<PreviewFormat>,
+}
+
+/// A picture of a whole scene.
+#[utoipa::path(
+    post, operation_id = "create_preview", path = "/v1/previews", tag = "previews", request_body = PreviewOrder,
+    params(("Idempotency-Key" = Option<String>, Header, description = "Refuses this key with another request")),
+    responses(
+        (status = 200, description = "The picture", headers(
+            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; error of the flakes, Lab")),
+            content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
+        (status = 422, description = "A paint that is not there, weights that do not fit, or a scene that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
+    )
+)]
+pub async fn create(
+    State(app): State<App>,
+    _: NoQuery,
+    idempotency: Idempotency,
+    Json(order): Json<PreviewOrder>,
+) -> Result<Answer, Problem> {
+    let (thing, weights) = order.thing(&app).await?;
+    let asked = order.profile.clone().unwrap_or_default();
+    asked.fits(&thing).map_err(Problem::in_body)?;
+    let profile = asked.of_body()?;
+    let spp = order.samples_per_pixel;
+    let asked = View {
+        scene: order.scene.unwrap_or_default(),
+        size: order.size.unwrap_or([512, 512]),
+        samples_per_pixel: spp.unwrap_or(profile.samples_per_pixel),
+        lights: order.lights,
+    };
+    let view = view::view(&app, asked, &view::Names::BODY)?;
+    let format = order.format.unwrap_or(PreviewFormat::Png);
+    let key = drawing::key(&thing, weights.as_ref(), &view, format.drawn());
+    idempotency
+        .claim(&app, &format!("{key} {format:?}"))
+        .await?;
+    let drawn = drawing::draw(&app, thing, weights, format.drawn(), view).await;
+    Ok(answer(drawn.map_err(Problem::in_body)?, format, None))
+}
+
+impl PreviewOrder {
+    async fn thing(
+        &self,
+        app: &App,
+    ) -> Result<(Arc<Shelved>, Option<RealisationWeights>), Problem> {
+        let missing = |field: &str, problem: Problem| match problem.kind() {
+            Kind::UnknownPaint | Kind::UnknownBlend => problem.naming_value(field),
+            _ => problem,
+        };
+        match (&self.paint, &self.blend) {
+            (Some(id), None) => {
+                let weights = [
+                    ("weights", &self.weights),
+                    ("base", &self.base),
+                    ("flake_lightness", &self.flake_lightness),
+                    ("flake_color", &self.flake_color),
+                ];
+                let given = weights.iter().find(|(_, list)| list.is_some());
+                let saturation = self.flake_saturation.map(|_| "flake_saturation");
+                if let Some(field) = given.map(|(field, _)| *field).or(saturation) {
+                    let detail = format!("One paint takes no {field}.");
+                    return Err(Problem::value(format!("/{field}"), detail).accepting("nothing"));
+                }
+                let paint = app.paint(id).await.map_err(|p| missing("paint", p))?;
+                Ok((paint, None))
+            }
+            (None, Some(id)) => {
+                let blend = app.blend(id).await.map_err(|p| missing("blend", p))?;
+                let asked = WeightQuery::of_lists(
+                    self.weights.clone(),
+                    self.base.clone(),
+                    self.flake_lightness.clone(),
+                    self.flake_color.clone(),
+                    self.flake_saturation,
+                );
+                let weights = asked.for_blend(&blend.names);
+                Ok((Arc::clone(&blend), Some(weights.map_err(Problem::in_body)?)))
+            }
+            _ => Err(
+                Problem::value("/paint", "Neither or both of paint and blend are given.")
+                    .accepting("the id of a paint, or of a blend"),
+            ),
+        }
+    }
+}
+
+/// The report on a picture stands beside it, under the same query.
+fn report_link(address: &str, query: Option<&str>) -> String {
+    let query = query.map_or(String::new(), |query| format!("?{query}"));
+    format!("<{address}/preview.json{query}>; rel=\"describedby\"; type=\"application/json\"")
+}
+
+/// How accurate a picture is: it belongs to the picture, so it is kept with it.
+const ACCURACY: HeaderName = HeaderName::from_static("carpaint-accuracy");
+
+fn answer(drawn: Drawn, format: PreviewFormat, picked: Option<&Picked>) -> Answer {
+    // What a target picks may change with the machine's load.
+    let keep = picked.map_or(drawn.keep, |_| Keep::Revalidated);
+    let answer = match format {
+        PreviewFormat::Json => Answer::bytes("application/json", drawn.report, keep),
+        _ => Answer::result(format.drawn().media_type(), drawn.picture, keep),
+    };
+    answer
+        .picked(picked)
+        .header(ACCURACY, &drawn.accuracy)
+        .stage("preview", drawn.time)
+}

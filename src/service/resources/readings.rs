@@ -1,0 +1,79 @@
+//! Readings: a paint under a virtual multi-angle instrument.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::extract::State;
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use crate::service::app::App;
+use crate::service::http::{Address, Answer, Keep, PaintProblems, Problem, ProblemDocument, Query};
+use crate::service::work::{Readings, WorkError};
+
+/// Where an instrument looks from.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ReadingQuery {
+    /// Aspecular angles in degrees, above -45 and below 135, separated by commas; those of the six-angle instruments
+    /// unless given.
+    #[param(style = Form, explode = false, max_items = 256, example = json!([-15, 15, 25, 45, 75, 110]))]
+    angles: Option<Vec<f64>>,
+}
+
+/// Readings of a paint, as the `multi_angle` part of a measured-paint package.
+///
+/// L, a, b of the reflectance factor under D65 for the 2° observer, light at 45°, the coat's mirror image left out.
+#[utoipa::path(
+    get, operation_id = "paint_readings", path = "/v1/paints/{id}/readings", tag = "paints",
+    params(("id" = String, Path, description = "Paint"), ReadingQuery),
+    responses(
+        (status = 200, description = "A row for each angle, in the order asked for", body = serde_json::Value),
+        (status = 400, description = "An angle that no instrument reads at", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
+    )
+)]
+pub async fn show(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    Query(query): Query<ReadingQuery>,
+) -> Result<Answer, Problem> {
+    let answer = |readings: &Readings| Answer::json(readings, Keep::Revalidated);
+    read(&app, &id, query, answer).await
+}
+
+/// Readings of a paint as comma-separated values, a line of column names first.
+#[utoipa::path(
+    get, operation_id = "paint_readings_table", path = "/v1/paints/{id}/readings.csv", tag = "paints",
+    params(("id" = String, Path, description = "Paint"), ReadingQuery),
+    responses(
+        (status = 200, description = "A line for each angle, in the order asked for", body = String, content_type = "text/csv"),
+        (status = 400, description = "An angle that no instrument reads at", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
+    )
+)]
+pub async fn table(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    Query(query): Query<ReadingQuery>,
+) -> Result<Answer, Problem> {
+    let answer = |readings: &Readings| {
+        let table = Answer::bytes("text/csv", readings.to_csv(), Keep::Revalidated);
+        table.saved_as(&format!("{id}.readings.csv"))
+    };
+    read(&app, &id, query, answer).await
+}
+
+async fn read(
+    app: &App,
+    id: &str,
+    query: ReadingQuery,
+    answer: impl FnOnce(&Readings) -> Answer,
+) -> Result<Answer, Problem> {
+    let begun = Instant::now();
+    let paint = app.paint(id).await?;
+    let works = Arc::clone(&app.works);
+    let read = move || works.readings(&paint.thing, query.angles.as_deref());
+    let readings = app.bench.run(read).await?.map_err(WorkError::of_query)?;
+    Ok(answer(&readings).stage("reading", begun.elapsed()))
+}

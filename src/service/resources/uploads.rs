@@ -1,0 +1,248 @@
+//! Uploads: a measurement comes in and becomes a paint.
+
+use std::sync::Arc;
+
+use axum::extract::{Request, State};
+use axum::response::Response;
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use super::documents::PaintDocument;
+use super::making;
+use crate::service::app::App;
+use crate::service::http::{
+    Idempotency, Prefer, Problem, ProblemDocument, Problems, Query, receiving,
+};
+use crate::service::ids;
+use crate::service::parameters::{ProfileText, targets};
+use crate::service::work::{
+    Asked, IngestOrder, IngestRequest, JobDocument, Layout, Picked, Target, ThetaHSpacing, runner,
+};
+use crate::store::{BlobWriter, Hash, JobKind};
+use crate::workshop::NAME_CHARACTERS;
+
+/// How an upload is read and fitted.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct IngestQuery {
+    /// Name of the paint, in place of the measurement's own.
+    #[param(min_length = 1, max_length = 200)]
+    name: Option<String>,
+    /// What the file is, where its bytes do not say.
+    layout: Option<Layout>,
+    /// Spacing of `theta_h` in an MPI 2005 table.
+    theta_h: Option<ThetaHSpacing>,
+    /// Bytes before the values of an MPI 2005 table, 84 unless given.
+    #[param(maximum = 1_048_576)]
+    header_bytes: Option<u64>,
+    /// Give the paint a clear coat of this index of refraction; otherwise the fit decides.
+    #[param(minimum = 1.0, maximum = 4.0)]
+    coat_ior: Option<f64>,
+    /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,clusters=100`.
+    #[param(value_type = Option<String>, example = "standard")]
+    profile: Option<ProfileText>,
+    /// Clusters per slice, in place of the profile's.
+    #[param(minimum = 1, maximum = 4096)]
+    clusters: Option<u32>,
+    /// In place of a profile: the cheapest whose error is at most this, Lab.
+    #[param(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[param(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
+}
+
+impl IngestQuery {
+    fn order(self) -> Result<IngestOrder, Problem> {
+        if let Some(name) = &self.name
+            && (!NAME_CHARACTERS.contains(&name.chars().count())
+                || name.chars().any(char::is_control))
+        {
+            return Err(Problem::parameter(
+                "name",
+                "The name is empty, too long, or holds control characters.",
+            )
+            .accepting("1 to 200 printable characters"));
+        }
+        if let Some(ior) = self.coat_ior
+            && !(1.0..=4.0).contains(&ior)
+        {
+            return Err(
+                Problem::parameter("coat_ior", format!("coat_ior is {ior}.")).accepting("1 to 4"),
+            );
+        }
+        if let Some(bytes) = self.header_bytes
+            && bytes > 1 << 20
+        {
+            return Err(
+                Problem::parameter("header_bytes", format!("header_bytes is {bytes}."))
+                    .accepting("0 to 1048576"),
+            );
+        }
+        let asked = self.profile.unwrap_or_default();
+        Ok(IngestOrder {
+            name: self.name,
+            layout: self.layout,
+            theta_h: self.theta_h,
+            header_bytes: self.header_bytes,
+            coat_ior: self.coat_ior,
+            clusters: self.clusters.or(asked.0.clusters),
+            profile: asked.with_clusters(self.clusters).of_query()?,
+        })
+    }
+}
+
+/// Upload a measurement.
+///
+/// The body is the file itself: a measured-paint package (.zip), an RGL `.bsdf`, an MPI 2005 table, a MERL binary, or a
+/// `.paint`. It is streamed to disk. The same bytes with the same options have the same id: asking again is safe, and
+/// answers at once. `Prefer: wait=N` waits up to N seconds for the paint; otherwise what takes more than 3 seconds is
+/// answered with the job that goes on.
+#[utoipa::path(
+    post, operation_id = "upload_paint", path = "/v1/paints", tag = "paints", params(IngestQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`"),
+        ("Idempotency-Key" = Option<String>, Header, description = "Refuses this key with another request")),
+    request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "The measurement"),
+    responses(
+        (status = 200, description = "The paint, made of the same upload before", body = PaintDocument),
+        (status = 201, description = "The paint", body = PaintDocument, headers(("Location" = String, description = "Its address"))),
+        (status = 202, description = "The job that makes it", body = JobDocument, headers(("Location" = String, description = "The job's address"))),
+        (status = 413, description = "The upload is too large", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "The upload is no measurement, or a damaged one", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
+    )
+)]
+pub async fn upload(
+    State(app): State<App>,
+    query: Result<Query<IngestQuery>, Problem>,
+    prefer: Prefer,
+    idempotency: Result<Idempotency, Problem>,
+    request: Request,
+) -> Result<Response, Problem> {
+    let (parts, body) = request.into_parts();
+    let target = query.as_ref().map_or_else(
+        |_| Ok(Target::default()),
+        |Query(q)| {
+            targets::of_query(
+                q.max_error,
+                q.max_seconds,
+                q.profile.is_some() || q.clusters.is_some(),
+            )
+        },
+    );
+    let order = query.and_then(|Query(query)| Ok((query.order()?, target?)));
+    let order =
+        order.and_then(|order| receiving::check_headers(&app, &parts.headers).map(|()| order));
+    let (order, idempotency) = match order.and_then(|order| Ok((order, idempotency?))) {
+        Ok(asked) => asked,
+        Err(problem) => {
+            receiving::drain(body.into_data_stream()).await;
+            return Err(problem);
+        }
+    };
+    let received = receiving::receive(&app, body).await?;
+    let accepted = runner::to_its_end(accept(app.clone(), received, order, idempotency)).await?;
+    let Accepted { id, job, picked } = accepted;
+    let address = format!("/v1/paints/{id}");
+    let made = || app.paint(&id);
+    making::answer(&app, prefer, job, &address, picked.as_ref(), made).await
+}
+
+/// An upload that was kept.
+struct Accepted {
+    /// Id of the paint it becomes.
+    id: String,
+    /// The job that makes it, unless it was made before.
+    job: Option<String>,
+    /// What was picked for a target.
+    picked: Option<Picked>,
+}
+
+/// Keeps what was received and has a job make a paint of it, unless there is one.
+async fn accept(
+    app: App,
+    received: Box<dyn BlobWriter>,
+    (mut order, target): (IngestOrder, Target),
+    idempotency: Idempotency,
+) -> Result<Accepted, Problem> {
+    // Until a job names the upload it must not be swept as nobody's.
+    let mut naming = app.removal.read().await;
+    let stored = received.finish().await?;
+    let whole = (
+        stored.hash.to_string(),
+        &order,
+        target.max_error,
+        target.max_seconds,
+    );
+    let claimed = idempotency.claim(&app, &ids::made_of("p_", &whole)).await;
+    let mut picked = None;
+    let ready = match claimed {
+        Ok(()) if target.is_some() => {
+            // Not held while a place to compute is waited for.
+            drop(naming);
+            let found = pick_for_upload(&app, stored.hash, &order, target).await;
+            naming = app.removal.read().await;
+            match found {
+                Ok(_) if app.blobs.local(stored.hash).await?.is_none() => {
+                    Err(Problem::overloaded())
+                }
+                Ok(found) => {
+                    order.profile = *found.profile();
+                    picked = Some(found);
+                    Ok(())
+                }
+                Err(problem) => Err(problem),
+            }
+        }
+        claimed => claimed,
+    };
+    if let Err(problem) = ready {
+        drop(naming);
+        app.forget_upload(stored.hash).await?;
+        return Err(problem);
+    }
+    let id = ids::made_of("p_", &(stored.hash.to_string(), &order));
+    if app.catalogue.paint(&id).await?.is_some() {
+        return Ok(Accepted {
+            id,
+            job: None,
+            picked,
+        });
+    }
+    let request = IngestRequest::new(stored.hash, order);
+    let job = runner::submit(&app, JobKind::Ingest, &id, &request).await;
+    drop(naming);
+    match job {
+        Ok(job) => Ok(Accepted {
+            id,
+            job: Some(job),
+            picked,
+        }),
+        Err(problem) => {
+            app.forget_upload(stored.hash).await?;
+            Err(problem)
+        }
+    }
+}
+
+async fn pick_for_upload(
+    app: &App,
+    upload: Hash,
+    order: &IngestOrder,
+    target: Target,
+) -> Result<Picked, Problem> {
+    let local = app.blobs.local(upload).await?;
+    let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
+    let (works, order) = (Arc::clone(&app.works), order.clone());
+    let picked = app.bench.run(move || {
+        let asked = Asked::Ingest {
+            upload: local.path(),
+            order: &order,
+        };
+        let folder = local.path().display().to_string();
+        works
+            .pick(&asked, &target)
+            .map_err(|error| error.without(&folder).of_upload())
+    });
+    picked.await?
+}

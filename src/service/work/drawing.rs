@@ -1,0 +1,126 @@
+//! Pictures: drawn once however many ask, and not to the end when nobody waits for them any more.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use super::workbench::call_off;
+use super::works::{Picture, PictureFormat, View, WorkError};
+use crate::blend::RealisationWeights;
+use crate::service::app::App;
+use crate::service::http::{Keep, Kind, Problem};
+use crate::service::ids;
+use crate::service::shelf::Shelved;
+use crate::store::{CachedResult, Hash};
+
+/// A picture that was drawn, now or before.
+#[derive(Debug)]
+pub struct Drawn {
+    /// How accurate it is, as the value of a header.
+    pub accuracy: String,
+    /// The report on it, JSON.
+    pub report: Bytes,
+    /// The file.
+    pub picture: CachedResult,
+    /// How long it may be kept.
+    pub keep: Keep,
+    /// How long this took.
+    pub time: Duration,
+}
+
+/// Key of a picture: everything that makes it.
+#[must_use]
+pub fn key(
+    thing: &Shelved,
+    weights: Option<&RealisationWeights>,
+    view: &View,
+    format: PictureFormat,
+) -> Hash {
+    ids::key(
+        "preview",
+        &(&thing.id, thing.file.to_string(), weights, view, format),
+    )
+}
+
+/// Draws a picture, or finds the one that was drawn before; who asks at the same time waits for the same.
+///
+/// # Errors
+///
+/// [`Problem`] for weights or a view that is refused, and when too many pictures wait.
+pub async fn draw(
+    app: &App,
+    thing: Arc<Shelved>,
+    weights: Option<RealisationWeights>,
+    format: PictureFormat,
+    view: View,
+) -> Result<Drawn, Problem> {
+    let (begun, keep) = (Instant::now(), thing.keep());
+    let key = key(&thing, weights.as_ref(), &view, format);
+    let _waits = app.watchers.watch(key);
+    let kept = loop {
+        let (on, thing, weights) = (app.clone(), Arc::clone(&thing), weights.clone());
+        let view = view.clone();
+        let compute = move || async move {
+            let (works, counter) = (Arc::clone(&on.works), on.metrics.previews_rendered.clone());
+            let bench = on.bench.clone();
+            let progress = move |_: f32| {
+                if on.is_stopping() || !on.watchers.any(key) {
+                    call_off();
+                }
+            };
+            let drawn = bench.run_or_call_off(move || {
+                works.preview(&thing.thing, weights.as_ref(), &view, format, &progress)
+            });
+            let Ok(drawn) = drawn.await? else {
+                return Err(Problem::new(
+                    Kind::JobCancelled,
+                    "Nobody waited for this picture any more.",
+                ));
+            };
+            let picture = drawn.map_err(WorkError::of_query)?;
+            counter.increment(1);
+            Ok(kept_form(&picture))
+        };
+        match app.results.get_or_compute(key, compute).await {
+            // Whoever was before us gave up a moment ago.
+            Err(problem) if problem.kind() == Kind::JobCancelled && !app.is_stopping() => {}
+            Err(problem) if problem.kind() == Kind::JobCancelled => {
+                return Err(Problem::overloaded());
+            }
+            kept => break kept?,
+        }
+    };
+    let (accuracy, report, picture) = split(&kept)?;
+    Ok(Drawn {
+        accuracy,
+        report,
+        picture,
+        keep,
+        time: begun.elapsed(),
+    })
+}
+
+/// What is kept of a picture: a line of its accuracy, a line of its report as JSON, the file.
+fn kept_form(picture: &Picture) -> Bytes {
+    let head = format!("{}\n{}\n", picture.accuracy, picture.report);
+    [head.as_bytes(), &picture.bytes].concat().into()
+}
+
+/// Accuracy, report and picture of what was kept.
+fn split(kept: &CachedResult) -> Result<(String, Bytes, CachedResult), Problem> {
+    let line_end = |from: usize| {
+        let end = kept.bytes[from..].iter().position(|&byte| byte == b'\n');
+        end.map(|end| from + end)
+            .ok_or_else(|| Problem::internal("a kept picture without its report"))
+    };
+    let first = line_end(0)?;
+    let second = line_end(first + 1)?;
+    let picture = CachedResult {
+        // The hash of all three tells pictures apart as surely as that of one.
+        hash: kept.hash,
+        bytes: kept.bytes.slice(second + 1..),
+    };
+    let accuracy = String::from_utf8_lossy(&kept.bytes[..first]).into_owned();
+    Ok((accuracy, kept.bytes.slice(first + 1..second), picture))
+}

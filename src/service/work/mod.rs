@@ -1,0 +1,31 @@
+//! Where the service works: what it asks of the workshop, at which places it computes, and its jobs.
+//!
+//! `works` says what can be asked, `workshop` has it done by the use cases that the command line calls too, and the
+//! `workbench` keeps it off the threads that talk to the network. What takes longer is a job of the `runner`:
+//! `ingesting` and `blending`; `drawing` pictures is quick enough to be waited for.
+//!
+//! Promised: a job that was acknowledged is done once, also after a kill; what nobody waits for any more is called off.
+//! Left to others: what requests look like (`resources`), how paints are made (`crate::workshop`).
+
+mod blending;
+pub mod drawing;
+mod ingesting;
+mod job_document;
+pub mod runner;
+mod under_way;
+mod watchers;
+mod workbench;
+mod works;
+mod workshop;
+
+pub use blending::{BlendOptions, BlendRequest};
+pub use ingesting::IngestRequest;
+pub use job_document::JobDocument;
+pub use runner::Jobs;
+pub use watchers::Watchers;
+pub use workbench::{Workbench, call_off};
+pub use works::{
+    Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
+    Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
+};
+pub use workshop::Workshop;

@@ -1,0 +1,315 @@
+//! Jobs: work on record that is done once, whatever happens to the process or to who asked for it.
+//!
+//! A job is acknowledged when it is on record. Whatever is queued or running when the process ends is begun again at the
+//! next start, from the record alone; one that was begun too often without an end has failed.
+
+use std::collections::HashMap;
+use std::panic::AssertUnwindSafe;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use futures::FutureExt;
+use serde::Serialize;
+use tokio::sync::{Semaphore, watch};
+
+use super::job_document::JobDocument;
+use super::under_way::UnderWay;
+use super::workbench::{CalledOff, Workbench};
+use super::{blending, ingesting};
+use crate::service::app::App;
+use crate::service::http::{Kind, Problem};
+use crate::service::ids;
+use crate::store::{JobKind, JobRecord, JobState, NewJob};
+
+/// How often a job is begun before it is given up: each time the process died over it.
+const MOST_ATTEMPTS: u32 = 10;
+
+/// Ended jobs that can still be asked for.
+const JOBS_KEPT: u32 = 10_000;
+
+/// Jobs under way.
+#[derive(Debug)]
+pub struct Jobs {
+    lanes: Arc<Semaphore>,
+    pub(super) bench: Workbench,
+    under_way: Mutex<HashMap<String, Arc<UnderWay>>>,
+    submitting: tokio::sync::Mutex<()>,
+    most: usize,
+}
+
+/// How a job ended that did not fail.
+pub type Ended = Result<(), CalledOff>;
+
+impl Jobs {
+    /// So many at a time, and so many under way in all.
+    #[must_use]
+    pub fn new(at_a_time: usize, most: usize) -> Self {
+        Self {
+            lanes: Arc::new(Semaphore::new(at_a_time)),
+            bench: Workbench::new(at_a_time, usize::MAX),
+            under_way: Mutex::default(),
+            submitting: tokio::sync::Mutex::default(),
+            most,
+        }
+    }
+
+    fn under_way(&self) -> MutexGuard<'_, HashMap<String, Arc<UnderWay>>> {
+        self.under_way
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn find(&self, id: &str) -> Option<Arc<UnderWay>> {
+        self.under_way().get(id).cloned()
+    }
+
+    /// The job that makes this, if one is under way and goes on.
+    fn making(&self, subject: &str) -> Option<String> {
+        let under_way = self.under_way();
+        let at_it = under_way
+            .values()
+            .find(|job| job.job.subject == subject && !job.is_cancelled());
+        at_it.map(|job| job.job.id.clone())
+    }
+
+    /// Whether nothing is under way.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        self.under_way().is_empty()
+    }
+}
+
+/// Records a job, or finds the unfinished one that makes the same. When this returns the job will be done.
+///
+/// # Errors
+///
+/// [`Problem`] when too many are under way or the store fails.
+pub async fn submit(
+    app: &App,
+    kind: JobKind,
+    subject: &str,
+    request: &impl Serialize,
+) -> Result<String, Problem> {
+    let request = serde_json::to_string(request).map_err(Problem::internal)?;
+    let job = NewJob {
+        id: ids::random("j_"),
+        kind,
+        subject: subject.to_owned(),
+        request,
+    };
+    let app = app.clone();
+    to_its_end(async move {
+        let _one_at_a_time = app.jobs.submitting.lock().await;
+        if let Some(at_it) = app.jobs.making(&job.subject) {
+            return Ok(at_it);
+        }
+        if app.jobs.under_way().len() >= app.jobs.most {
+            return Err(Problem::overloaded());
+        }
+        let submitted = app.catalogue.submit_job(&job).await?;
+        let id = submitted.job.id.clone();
+        if app.jobs.find(&id).is_none() {
+            start(&app, submitted.job);
+        }
+        Ok(id)
+    })
+    .await
+}
+
+/// Does what must not stop in the middle when the caller goes away.
+///
+/// # Errors
+///
+/// What the work says, or [`Kind::Internal`] when it panicked.
+pub async fn to_its_end<T: Send + 'static>(
+    work: impl Future<Output = Result<T, Problem>> + Send + 'static,
+) -> Result<T, Problem> {
+    tokio::spawn(work).await.map_err(Problem::internal)?
+}
+
+/// Begins again what was under way when the last process ended.
+///
+/// # Errors
+///
+/// [`Problem`] when the store fails.
+pub async fn resume(app: &App) -> Result<(), Problem> {
+    for job in app.catalogue.unfinished_jobs().await? {
+        if job.attempts >= MOST_ATTEMPTS {
+            let given_up = Problem::new(
+                Kind::Internal,
+                "The service ended several times over this job.",
+            );
+            end(app, &job, JobState::Failed, Some(&given_up)).await?;
+        } else {
+            start(app, job);
+        }
+    }
+    Ok(())
+}
+
+fn start(app: &App, job: JobRecord) {
+    let under_way = Arc::new(UnderWay {
+        told: watch::Sender::new(JobDocument::of(&job)),
+        cancelled: watch::Sender::new(false),
+        job,
+    });
+    app.jobs
+        .under_way()
+        .insert(under_way.job.id.clone(), Arc::clone(&under_way));
+    tokio::spawn(run(app.clone(), under_way));
+}
+
+async fn run(app: App, under_way: Arc<UnderWay>) {
+    let job = &under_way.job;
+    let last = match AssertUnwindSafe(run_to_end(&app, &under_way))
+        .catch_unwind()
+        .await
+    {
+        Ok(Ok(ended)) => ended,
+        Ok(Err(problem)) => ended_badly(&app, job, problem).await,
+        Err(_) => {
+            ended_badly(
+                &app,
+                job,
+                Problem::internal(format!("job {} panicked", job.id)),
+            )
+            .await
+        }
+    };
+    app.jobs.under_way().remove(&job.id);
+    if let Some(last) = last {
+        under_way.told.send_replace(last);
+    }
+}
+
+async fn ended_badly(app: &App, job: &JobRecord, problem: Problem) -> Option<JobDocument> {
+    match end(app, job, JobState::Failed, Some(&problem)).await {
+        Ok(document) => Some(document),
+        Err(_) => Some(JobDocument::at_end(
+            job,
+            JobState::Failed,
+            Some(problem.document(None)),
+        )),
+    }
+}
+
+/// Runs a job and records its end; `None` when it goes on after a restart.
+async fn run_to_end(app: &App, under_way: &Arc<UnderWay>) -> Result<Option<JobDocument>, Problem> {
+    let job = &under_way.job;
+    let lane = tokio::select! {
+        lane = app.jobs.lanes.acquire() => Some(lane.map_err(Problem::internal)?),
+        () = under_way.called_off() => None,
+        () = app.stopped() => return Ok(None),
+    };
+    if lane.is_none() {
+        return end(app, job, JobState::Cancelled, None).await.map(Some);
+    }
+    app.catalogue.begin_job(&job.id).await?;
+    under_way
+        .told
+        .send_modify(|told| told.state = JobState::Running);
+    let ended = match job.kind {
+        JobKind::Ingest => ingesting::ingest(app, under_way).await?,
+        JobKind::Blend => blending::blend(app, under_way).await?,
+    };
+    match ended {
+        Ok(()) => end(app, job, JobState::Done, None).await.map(Some),
+        Err(CalledOff) if under_way.is_cancelled() => {
+            end(app, job, JobState::Cancelled, None).await.map(Some)
+        }
+        Err(CalledOff) => {
+            // The service goes down: the next one begins it again.
+            app.catalogue.return_job(&job.id).await?;
+            Ok(None)
+        }
+    }
+}
+
+/// Records the end of a job, and lets go of an upload that came to nothing.
+async fn end(
+    app: &App,
+    job: &JobRecord,
+    state: JobState,
+    problem: Option<&Problem>,
+) -> Result<JobDocument, Problem> {
+    let problem = problem.map(|problem| problem.document(None));
+    let stored = problem
+        .as_ref()
+        .map(serde_json::to_string)
+        .transpose()
+        .map_err(Problem::internal)?;
+    app.catalogue
+        .end_job(&job.id, state, stored.as_deref())
+        .await?;
+    app.catalogue.forget_ended_jobs(JOBS_KEPT).await?;
+    if job.kind == JobKind::Ingest && state != JobState::Done {
+        ingesting::forget_upload(app, job).await?;
+    }
+    Ok(JobDocument::at_end(job, state, problem))
+}
+
+/// How a job stands.
+///
+/// # Errors
+///
+/// [`Kind::UnknownJob`] when there is none.
+pub async fn look_up(app: &App, id: &str) -> Result<JobDocument, Problem> {
+    if let Some(under_way) = app.jobs.find(id) {
+        return Ok(under_way.told.borrow().clone());
+    }
+    let unknown = || {
+        Problem::new(Kind::UnknownJob, format!("There is no job {id:?}."))
+            .accepting("the address in a 202's Location")
+    };
+    let job = app.catalogue.job(id).await?.ok_or_else(unknown)?;
+    Ok(JobDocument::of(&job))
+}
+
+/// How a job stands once it has ended, or when the time is up or the service goes down.
+///
+/// # Errors
+///
+/// As [`look_up`].
+pub async fn wait_for(app: &App, id: &str, time: Duration) -> Result<JobDocument, Problem> {
+    if let Some(under_way) = app.jobs.find(id) {
+        let mut told = under_way.told.subscribe();
+        drop(under_way);
+        tokio::select! {
+            _ = told.wait_for(|job| job.state.is_final()) => {}
+            () = tokio::time::sleep(time) => {}
+            () = app.stopped() => {}
+        }
+        return Ok(told.borrow().clone());
+    }
+    look_up(app, id).await
+}
+
+/// What a job has to tell from now on; `None` when it has ended.
+pub fn follow(app: &App, id: &str) -> Option<watch::Receiver<JobDocument>> {
+    app.jobs
+        .find(id)
+        .map(|under_way| under_way.told.subscribe())
+}
+
+/// Calls a job off and says how it ended.
+///
+/// # Errors
+///
+/// [`Kind::UnknownJob`] when there is none, [`Kind::JobEnded`] when it is done or has failed.
+pub async fn cancel(app: &App, id: &str) -> Result<JobDocument, Problem> {
+    if let Some(under_way) = app.jobs.find(id) {
+        under_way.cancelled.send_replace(true);
+    }
+    // A step of the work that does not look up takes a moment; the job tells its end itself.
+    let job = wait_for(app, id, Duration::from_secs(2)).await?;
+    match job.state {
+        JobState::Done | JobState::Failed => {
+            let detail = format!(
+                "The job is {} already, it cannot be cancelled.",
+                job.state.word()
+            );
+            Err(Problem::new(Kind::JobEnded, detail).accepting("jobs that are queued or running"))
+        }
+        _ => Ok(job),
+    }
+}

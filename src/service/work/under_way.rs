@@ -1,0 +1,96 @@
+//! A job under way, as the work that it does sees it.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use serde::Deserialize;
+use tokio::sync::watch;
+
+use super::job_document::JobDocument;
+use super::workbench::{CalledOff, call_off};
+use crate::service::app::App;
+use crate::service::http::Problem;
+use crate::store::JobRecord;
+
+/// A job that is queued or running in this process.
+#[derive(Debug)]
+pub struct UnderWay {
+    pub(super) job: JobRecord,
+    pub(super) told: watch::Sender<JobDocument>,
+    pub(super) cancelled: watch::Sender<bool>,
+}
+
+impl UnderWay {
+    /// What it is about.
+    #[must_use]
+    pub const fn job(&self) -> &JobRecord {
+        &self.job
+    }
+
+    /// The request it was recorded with.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the record does not read back.
+    pub fn request<T: for<'de> Deserialize<'de>>(&self) -> Result<T, Problem> {
+        serde_json::from_str(&self.job.request).map_err(Problem::internal)
+    }
+
+    /// Says what is being done now.
+    pub fn stage(&self, stage: &str) {
+        self.told
+            .send_modify(|told| stage.clone_into(&mut told.stage));
+    }
+
+    /// Whether somebody called the job off.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        *self.cancelled.borrow()
+    }
+
+    /// Returns once somebody called the job off.
+    pub async fn called_off(&self) {
+        let _ = self
+            .cancelled
+            .subscribe()
+            .wait_for(|&cancelled| cancelled)
+            .await;
+    }
+
+    /// Computes one stage of the job. The work hears of a call through its progress.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the work panicked.
+    pub async fn compute<T: Send + 'static>(
+        self: &Arc<Self>,
+        app: &App,
+        stage: &str,
+        work: impl FnOnce(&(dyn Fn(f32) + Sync)) -> T + Send + 'static,
+    ) -> Result<Result<T, CalledOff>, Problem> {
+        self.stage(stage);
+        let (this, on, begun) = (Arc::clone(self), app.clone(), Instant::now());
+        let progress = move |share: f32| {
+            if on.is_stopping() || this.is_cancelled() {
+                call_off();
+            }
+            this.tell(share.clamp(0.0, 1.0), begun.elapsed());
+        };
+        app.jobs
+            .bench
+            .run_or_call_off(move || work(&progress))
+            .await
+    }
+
+    /// Tells the share done, in steps that are worth a message.
+    fn tell(&self, share: f32, time: Duration) {
+        self.told.send_if_modified(|told| {
+            if (share - told.progress).abs() < 1e-3 {
+                return false;
+            }
+            told.progress = share;
+            told.seconds_left = (share > 0.02).then(|| time.as_secs_f32() * (1.0 - share) / share);
+            true
+        });
+    }
+}

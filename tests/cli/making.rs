@@ -1,0 +1,236 @@
+//! Blends, realisations, pictures and texels as files.
+
+use crate::desk::{Desk, json};
+
+#[test]
+fn a_blend_is_realised_as_everything_the_same_on_any_number_of_threads() {
+    let desk = Desk::with_blend();
+    for name in ["r.zip", "r.glb", "r.json", "r.paint"] {
+        let mut seen = Vec::new();
+        for threads in ["1", "2", "8"] {
+            desk.ok(&[
+                "realise",
+                "b.blend",
+                "--weights",
+                "0.3,0.7",
+                "--threads",
+                threads,
+                "--out",
+                name,
+            ]);
+            seen.push(desk.read(name));
+        }
+        assert!(
+            seen[0].len() > 500 && seen.windows(2).all(|w| w[0] == w[1]),
+            "{name} differs"
+        );
+    }
+    assert_eq!(
+        json(&desk.read("r.json"))["format"]
+            .as_str()
+            .map(|f| f.starts_with("carpaint")),
+        Some(true)
+    );
+    desk.ok(&[
+        "blend",
+        "r.paint",
+        "sample:white",
+        "--profile",
+        "draft",
+        "--out",
+        "again.blend",
+    ]);
+}
+
+#[test]
+fn weights_are_asked_for_and_checked() {
+    let desk = Desk::with_blend();
+    let out = ["--out", "x.json"];
+    let with = |words: &[&'static str]| [&["realise", "b.blend"], words, &out].concat();
+    let said = desk.refused(2, &with(&[]));
+    assert!(
+        said.contains("2 numbers") && said.contains("bmw339, blue"),
+        "{said}"
+    );
+    for weights in ["nan,1", "inf,0", "1", "a,b", "1,2,3", ""] {
+        desk.refused(
+            2,
+            &[
+                "realise",
+                "b.blend",
+                "--weights",
+                weights,
+                "--out",
+                "x.json",
+            ],
+        );
+    }
+    assert_eq!(desk.files(), ["b.blend"]);
+    for weights in ["-2,3", "0,0", "1e6,-1e6"] {
+        desk.ok(&[
+            "realise",
+            "b.blend",
+            "--weights",
+            weights,
+            "--out",
+            "x.json",
+        ]);
+    }
+    desk.refused(
+        2,
+        &[
+            "preview",
+            "sample:white",
+            "--weights",
+            "1,0",
+            "--out",
+            "x.png",
+        ],
+    );
+}
+
+#[test]
+fn previews_are_drawn_in_the_size_asked_for() {
+    let desk = Desk::with_blend();
+    desk.ok(&[
+        "preview",
+        "b.blend",
+        "--weights",
+        "0.5,0.5",
+        "--size",
+        "40x30",
+        "--spp",
+        "2",
+        "--out",
+        "p.png",
+    ]);
+    let png = desk.read("p.png");
+    assert_eq!(
+        (&png[..4], &png[16..24]),
+        (&b"\x89PNG"[..], &[0, 0, 0, 40, 0, 0, 0, 30][..])
+    );
+    desk.ok(&[
+        "preview",
+        "sample:white",
+        "--scene",
+        "panel",
+        "--size",
+        "16x16",
+        "--spp",
+        "1",
+        "--out",
+        "p.exr",
+    ]);
+    assert_eq!(desk.read("p.exr")[..4], [0x76, 0x2f, 0x31, 0x01]);
+    assert!(
+        desk.refused(
+            2,
+            &[
+                "preview",
+                "sample:white",
+                "--scene",
+                "cube",
+                "--out",
+                "p.png"
+            ]
+        )
+        .contains("capsule")
+    );
+    desk.refused(
+        2,
+        &["preview", "sample:white", "--size", "0x5", "--out", "p.png"],
+    );
+    desk.refused(2, &["preview", "sample:white", "--out", "p.gif"]);
+}
+
+#[test]
+fn texels_are_flakes_at_one_angle_pair() {
+    let desk = Desk::with_blend();
+    let words = [
+        "texels",
+        "b.blend",
+        "--weights",
+        "1,0",
+        "--theta-h",
+        "3",
+        "--theta-d",
+        "10",
+        "--size",
+        "32x16",
+    ];
+    desk.ok(&[&words[..], &["--seed", "4", "--out", "t.exr"]].concat());
+    desk.ok(&[&words[..], &["--seed", "5", "--out", "u.exr"]].concat());
+    assert_ne!(desk.read("t.exr"), desk.read("u.exr"));
+    desk.refused(
+        2,
+        &[
+            "texels",
+            "b.blend",
+            "--weights",
+            "1,0",
+            "--theta-h",
+            "95",
+            "--theta-d",
+            "0",
+            "--out",
+            "t.exr",
+        ],
+    );
+}
+
+#[test]
+fn a_blend_names_the_paints_it_speaks_of_whatever_their_order() {
+    let desk = Desk::new();
+    for pair in [["blue", "bmw339"], ["bmw339", "blue"]] {
+        let words = ["blend", pair[0], pair[1], "--profile", "draft", "--json"];
+        let told = json(
+            &desk
+                .ok(&[&words[..], &["--out", "b.blend"]].concat())
+                .stdout,
+        );
+        let shown = json(&desk.ok(&["show", "b.blend", "--json"]).stdout);
+        for correspondence in [&told["correspondence"], &shown["correspondence"]] {
+            assert_eq!(
+                correspondence["without_flakes"][0]["name"], "blue",
+                "{correspondence}"
+            );
+            let place = correspondence["without_flakes"][0]["place"].as_u64();
+            assert_eq!(
+                place.and_then(|k| usize::try_from(k).ok()).map(|k| pair[k]),
+                Some("blue")
+            );
+        }
+    }
+}
+
+#[test]
+fn a_realised_paint_remembers_its_weights_and_that_its_flakes_were_simulated() {
+    let desk = Desk::with_blend();
+    let own = ["--base", "3,-2", "--flake-lightness", "0.5,0.5"];
+    let color = ["--flake-color", "1,0", "--out", "r.paint"];
+    desk.ok(&[&["realise", "b.blend"][..], &own, &color].concat());
+    let about = json(&desk.ok(&["show", "r.paint", "--json"]).stdout);
+    let provenance = &about["provenance"];
+    assert_eq!(provenance["simulated_flakes"], true);
+    let realisation = &provenance["realisation"];
+    assert_eq!(
+        (&realisation["base"], &realisation["flake_color"]),
+        (
+            &serde_json::json!([3.0, -2.0]),
+            &serde_json::json!([1.0, 0.0])
+        )
+    );
+    let clamps = about["clamps"].as_array().expect("a list");
+    assert!(!clamps.is_empty() && about["clamps"] == realisation["clamps"]);
+    let text = String::from_utf8(desk.ok(&["show", "r.paint"]).stdout).expect("text");
+    assert!(text.contains("\nclamped        "), "{text}");
+
+    // Blended again its clusters are reduced, which the blend keeps.
+    let again = ["blend", "sample:white", "r.paint", "--clusters", "5"];
+    desk.ok(&[&again[..], &["--out", "again.blend"]].concat());
+    let shown = json(&desk.ok(&["show", "again.blend", "--json"]).stdout);
+    let reduced = &shown["correspondence"]["reduced"][0];
+    assert_eq!((&reduced["place"], &reduced["to"]), (&1.into(), &5.into()));
+    assert!(reduced["from"].as_u64() > Some(5), "{reduced}");
+    assert_eq!(shown["paints"][1]["simulated_flakes"], true);
+}

@@ -1,0 +1,118 @@
+//! Knobs, targets and estimates.
+
+use std::fs;
+
+use crate::desk::{Desk, json};
+
+#[test]
+fn knobs_are_turned_by_name_and_unknown_ones_are_refused_with_what_there_is() {
+    let desk = Desk::new();
+    let export = |more: &[&'static str]| {
+        [
+            &["samples", "export", "bmw339"],
+            more,
+            &["--out", "p.paint"],
+        ]
+        .concat()
+    };
+    let few = [
+        "--profile",
+        "draft",
+        "--knob",
+        "clusters=9",
+        "--knob",
+        "angle_step=4",
+    ];
+    desk.ok(&export(&few));
+    let about = json(&desk.ok(&["show", "p.paint", "--json"]).stdout);
+    let clustering = &about["flakes"]["clustering"];
+    assert_eq!(
+        (&clustering["clusters"], &clustering["angle_step"]),
+        (&9.into(), &4.into())
+    );
+    assert_eq!(about["flakes"]["slices"], 49);
+    let error = clustering["error"]["lightness_w1"]["p90"]
+        .as_f64()
+        .expect("measured");
+    assert_eq!(about["error"]["lab"].as_f64(), Some(error));
+    fs::write(
+        desk.path("k.json"),
+        r#"{"preset": "draft", "clusters": 9, "angle_step": 4}"#,
+    )
+    .expect("written");
+    let first = desk.read("p.paint");
+    desk.ok(&export(&["--profile", "k.json"]));
+    assert_eq!(desk.read("p.paint"), first, "a file of knobs says the same");
+    let said = desk.refused(2, &export(&["--knob", "cluster=9"]));
+    assert!(
+        said.contains("cluster") && said.contains("samples_per_pixel"),
+        "{said}"
+    );
+    assert!(
+        desk.refused(2, &export(&["--knob", "clusters=0"]))
+            .contains("1 to 4096")
+    );
+    fs::write(
+        desk.path("bad.json"),
+        r#"{"preset": "draft", "samples": 9}"#,
+    )
+    .expect("written");
+    assert!(
+        desk.refused(3, &export(&["--profile", "bad.json"]))
+            .contains("samples_per_pixel")
+    );
+}
+
+#[test]
+fn a_target_names_the_profile_that_was_picked_for_it() {
+    let desk = Desk::with_blend();
+    let realise = |error: &'static str| {
+        let words = [
+            "realise",
+            "b.blend",
+            "--weights",
+            "0.5,0.5",
+            "--json",
+            "--max-error",
+            error,
+        ];
+        [&words[..], &["--out", "r.json"]].concat()
+    };
+    let met = json(&desk.ok(&realise("1000")).stdout);
+    assert_eq!(met["picked"]["met"], true);
+    let missed = json(&desk.ok(&realise("1e-9")).stdout);
+    assert_eq!(missed["picked"]["met"], false);
+    assert_eq!(
+        missed["picked"]["estimate"]["knobs"]["precision"], "f32",
+        "the best there is"
+    );
+    let made = json(&desk.read("r.json"));
+    assert_eq!(made["settings"]["precision"], "f32");
+    let stated = &missed["picked"]["estimate"]["error"]["value"];
+    assert_eq!(&made["report"]["accuracy"]["error"]["lab"], stated);
+    let knobs = ["--max-seconds", "1", "--profile", "draft"];
+    desk.refused(2, &[&realise("1")[..], &knobs].concat());
+    assert!(desk.refused(2, &realise("0")).contains("--max-error"));
+}
+
+/// Coarse, since other tests run beside it; `tests/bench/estimates.rs` is the fine one.
+#[test]
+fn an_estimate_is_of_the_order_of_what_then_happens() {
+    let desk = Desk::new();
+    let asked = ["blend", "sample:bmw339", "sample:ford_f8"];
+    let estimate = [&["estimate"], &asked[..], &["--json"]].concat();
+    let estimate = json(&desk.ok(&estimate).stdout);
+    let begun = std::time::Instant::now();
+    let made = [&asked[..], &["--json", "--out", "x.blend"]].concat();
+    let made = json(&desk.ok(&made).stdout);
+    let took = begun.elapsed().as_secs_f64();
+    let ratio = estimate["seconds"].as_f64().expect("seconds") / took;
+    assert!((0.2..5.0).contains(&ratio), "{estimate} {took}");
+    let bytes = desk.read("x.blend").len() as f64;
+    let ratio = estimate["bytes"].as_f64().expect("bytes") / bytes;
+    assert!((0.8..1.25).contains(&ratio), "{estimate} {bytes}");
+    // Of the same slices, so the same but for the transport's gap.
+    let stated = estimate["error"]["value"].as_f64().expect("a number");
+    let lab = made["error"]["lab"].as_f64().expect("a number");
+    assert!((stated - lab).abs() < 1e-6, "{stated} {lab}");
+}
