@@ -32,7 +32,9 @@ pub use ingest::{
     BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, check_clusters, ingest,
     ingest_in_stages, ingest_upload, open_measurement,
 };
-pub use previewing::{Light, PictureFormat, PreviewOptions, preview, read_environment, texels};
+pub use previewing::{
+    Light, MOST_SAMPLES, PictureFormat, PreviewOptions, preview, read_environment, texels,
+};
 pub use reading::{MOST_ANGLES, readings};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};

@@ -14,6 +14,9 @@ use crate::render::{
     self, DirectionalLight, Environment, RenderError, SamplingError, Scene, Shape,
 };
 
+/// Most samples of one picture that a service draws or a target is looked for with: pixels times samples per pixel.
+pub const MOST_SAMPLES: u64 = 1 << 28;
+
 /// What a picture shows.
 #[derive(Clone, Debug)]
 pub struct PreviewOptions {

@@ -1,6 +1,6 @@
 //! A target in place of knobs: the cheapest profile that is accurate enough, or the most accurate that is fast enough.
 //!
-//! Every profile of a short ladder is estimated on the work itself; where an estimate's error is of a sample of the
+//! The profiles of a short ladder are estimated on the work itself, from cheap to dear until one will do; where an estimate's error is of a sample of the
 //! slices, the error is measured in full before a profile is picked for it. What is picked for a time limit depends on
 //! the machine; the result depends on the profile picked and on nothing else.
 
@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::estimate::{Estimate, Work};
 use super::realising::{Format, choose, error_of};
-use super::{WorkshopError, blend_paints};
+use super::{MOST_SAMPLES, WorkshopError, blend_paints};
 use crate::accuracy::{Profile, blend_error, file_error, writing_error};
 use crate::export::{ExportSettings, Precision};
 use crate::fit::ClusterSettings;
@@ -33,7 +33,7 @@ pub struct Picked {
     pub met: bool,
     /// The profile, and what the work will take with it.
     pub estimate: Estimate,
-    /// How many profiles were looked at.
+    /// How many profiles were looked at, from cheap to dear.
     pub tried: usize,
 }
 
@@ -99,12 +99,18 @@ impl Target {
     pub fn pick(&self, work: &Work<'_>) -> Result<Picked, WorkshopError> {
         self.check()?;
         let mut estimates = Vec::new();
+        // From cheap to dear: what comes after one that is accurate enough, or too slow, need not be looked at.
         for profile in ladder(work) {
             let mut estimate = work.estimate(&profile)?;
-            if self.max_error.is_some() {
+            let too_slow = self.max_seconds.is_some_and(|most| estimate.seconds > most);
+            if self.max_error.is_some() && !too_slow {
                 measure_error(work, &profile, &mut estimate)?;
             }
+            let enough = self.max_error.is_some() && self.is_met(&estimate);
             estimates.push(estimate);
+            if enough || too_slow {
+                break;
+            }
         }
         let tried = estimates.len();
         let estimate = self
@@ -198,8 +204,12 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
                 ..standard
             })
             .collect(),
-        Work::Preview { .. } => [1, 4, 16, 64, 256, 1024]
+        Work::Preview { options, .. } => [1, 4, 16, 64, 256, 1024]
             .into_iter()
+            .filter(|samples| {
+                let [width, height] = options.size.map(u64::from);
+                *samples == 1 || width * height * u64::from(*samples) <= MOST_SAMPLES
+            })
             .map(|samples_per_pixel| Profile {
                 samples_per_pixel,
                 ..standard

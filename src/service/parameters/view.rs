@@ -13,12 +13,10 @@ use crate::service::app::App;
 use crate::service::http::{Place, Problem};
 use crate::service::shelf::Shelved;
 use crate::service::work::{Asked, Light, Picked, PictureFormat, Shape, View, WorkError};
+use crate::workshop::MOST_SAMPLES;
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u32 = 4096;
-
-/// Most samples of one picture: pixels times samples per pixel.
-const MOST_SAMPLES: u64 = 1 << 28;
 
 /// Most lights of a scene.
 const MOST_LIGHTS: usize = 16;
@@ -83,7 +81,7 @@ impl<'de> Deserialize<'de> for Size {
 }
 
 impl ViewQuery {
-    fn view(&self, app: &App) -> Result<View, Problem> {
+    fn view(&self, app: &App, spp: Option<u32>) -> Result<View, Problem> {
         let Size(size) = self.size.unwrap_or(Size([512, 512]));
         let profile = self.profile.clone().unwrap_or_default().of_query()?;
         let light = self.light.as_deref().map(|list| {
@@ -101,7 +99,7 @@ impl ViewQuery {
         let asked = View {
             scene: self.scene.unwrap_or_default(),
             size,
-            samples_per_pixel: self.spp.unwrap_or(profile.samples_per_pixel),
+            samples_per_pixel: spp.unwrap_or(profile.samples_per_pixel),
             lights: light.transpose()?.map(|light| vec![light]),
         };
         view(app, asked, &Names::QUERY)
@@ -120,12 +118,13 @@ impl ViewQuery {
         if let Some(asked) = &self.profile {
             asked.fits(thing)?;
         }
-        let mut view = self.view(app)?;
         let knobs = self.profile.is_some() || self.spp.is_some();
         let target = targets::of_query(self.max_error, self.max_seconds, knobs)?;
         if !target.is_some() {
-            return Ok((view, None));
+            return Ok((self.view(app, self.spp)?, None));
         }
+        // How many samples it takes is yet to be found.
+        let mut view = self.view(app, Some(1))?;
         let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(thing), weights.cloned());
         let wanted = view.clone();
         let found = app.bench.run(move || {

@@ -1,6 +1,10 @@
 //! The job that makes a paint of an upload.
+//!
+//! What was acknowledged is not lost over a fault that is none of the upload's: while the disk is full or the store does
+//! not answer the job tries again, and when it gives up the upload stays.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
@@ -9,8 +13,8 @@ use super::under_way::UnderWay;
 use super::workbench::CalledOff;
 use super::works::{IngestOrder, WorkError};
 use crate::service::app::App;
-use crate::service::http::Problem;
-use crate::store::{Hash, JobRecord};
+use crate::service::http::{Kind, Problem};
+use crate::store::{Hash, JobRecord, StoreError};
 
 /// What a job needs to make a paint.
 #[derive(Debug, Serialize, Deserialize)]
@@ -40,16 +44,64 @@ impl IngestRequest {
     }
 }
 
+/// Pauses between tries after a fault that may pass.
+const PAUSES: [Duration; 3] = [
+    Duration::from_millis(500),
+    Duration::from_secs(5),
+    Duration::from_secs(60),
+];
+
+/// Why a try came to nothing.
+enum Fault {
+    /// The store's; the next try may go well.
+    OfStore(Problem),
+    /// The upload's, or our own.
+    Lasting(Problem),
+}
+
+impl From<Problem> for Fault {
+    fn from(problem: Problem) -> Self {
+        Self::OfStore(problem)
+    }
+}
+
+impl From<StoreError> for Fault {
+    fn from(error: StoreError) -> Self {
+        Self::OfStore(error.into())
+    }
+}
+
 /// The job: fits an upload and keeps the paint.
 pub async fn ingest(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Problem> {
+    let mut pauses = PAUSES.into_iter();
+    loop {
+        let problem = match once(app, under_way).await {
+            Ok(ended) => return Ok(ended),
+            Err(Fault::Lasting(problem)) => return Err(problem),
+            Err(Fault::OfStore(problem)) => problem,
+        };
+        let Some(pause) = pauses.next() else {
+            return Err(problem);
+        };
+        under_way.stage("waiting to try again");
+        tokio::select! {
+            () = tokio::time::sleep(pause) => {}
+            () = under_way.called_off() => return Ok(Err(CalledOff)),
+            () = app.stopped() => return Ok(Err(CalledOff)),
+        }
+    }
+}
+
+async fn once(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Fault> {
     let id = &under_way.job().subject;
     if app.catalogue.paint(id).await?.is_some() {
         return Ok(Ok(()));
     }
-    let IngestRequest { upload, order } = under_way.request()?;
-    let upload = upload.hash()?;
+    let IngestRequest { upload, order } = under_way.request().map_err(Fault::Lasting)?;
+    let upload = upload.hash().map_err(Fault::Lasting)?;
     let local = app.blobs.local(upload).await?;
-    let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
+    let gone = || Fault::Lasting(Problem::internal(format!("upload {upload} is not there")));
+    let local = local.ok_or_else(gone)?;
     let works = Arc::clone(&app.works);
     let fitted = under_way.compute(app, "fitting", move |progress| {
         let fitted = works.ingest(local.path(), &order, progress);
@@ -57,17 +109,26 @@ pub async fn ingest(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Probl
         let folder = local.path().display().to_string();
         fitted.map_err(|error| error.without(&folder))
     });
-    let Ok(fitted) = fitted.await? else {
+    let Ok(fitted) = fitted.await.map_err(Fault::Lasting)? else {
         return Ok(Err(CalledOff));
     };
-    let file = fitted.map_err(WorkError::of_upload)?;
+    let file = fitted.map_err(|error| Fault::Lasting(WorkError::of_upload(error)))?;
     app.metrics.paints_fitted.increment(1);
     under_way.stage("storing");
-    app.keep_paint(id, file, Some(upload)).await.map(Ok)
+    Ok(app.keep_paint(id, file, Some(upload)).await.map(Ok)?)
 }
 
-/// Lets go of the upload of a job that came to nothing.
-pub async fn forget_upload(app: &App, job: &JobRecord) -> Result<(), Problem> {
+/// Lets go of the upload of a job that came to nothing, unless that was our own fault.
+pub async fn forget_upload(
+    app: &App,
+    job: &JobRecord,
+    problem: Option<Kind>,
+) -> Result<(), Problem> {
     let request: IngestRequest = serde_json::from_str(&job.request).map_err(Problem::internal)?;
-    app.forget_upload(request.upload.hash()?).await
+    let upload = request.upload.hash()?;
+    if matches!(problem, Some(Kind::Internal | Kind::StorageFull)) {
+        tracing::error!(%upload, job = job.id, "a job failed that its upload is not to blame for; the upload stays");
+        return Ok(());
+    }
+    app.forget_upload(upload).await
 }

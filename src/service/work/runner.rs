@@ -24,6 +24,9 @@ use crate::store::{JobKind, JobRecord, JobState, NewJob};
 /// How often a job is begun before it is given up: each time the process died over it.
 const MOST_ATTEMPTS: u32 = 10;
 
+/// How often the end of a job is written before it is left to the next start.
+const MOST_ENDINGS: u32 = 5;
+
 /// Ended jobs that can still be asked for.
 const JOBS_KEPT: u32 = 10_000;
 
@@ -108,8 +111,11 @@ pub async fn submit(
         }
         let submitted = app.catalogue.submit_job(&job).await?;
         let id = submitted.job.id.clone();
-        if app.jobs.find(&id).is_none() {
-            start(&app, submitted.job);
+        match app.jobs.find(&id) {
+            None => start(&app, submitted.job),
+            // Its end is not on record yet, and then its upload goes.
+            Some(at_it) if at_it.is_cancelled() => return Err(Problem::overloaded()),
+            Some(_) => {}
         }
         Ok(id)
     })
@@ -177,20 +183,14 @@ async fn run(app: App, under_way: Arc<UnderWay>) {
         }
     };
     app.jobs.under_way().remove(&job.id);
+    // What has no end on record is begun again at the next start.
     if let Some(last) = last {
         under_way.told.send_replace(last);
     }
 }
 
 async fn ended_badly(app: &App, job: &JobRecord, problem: Problem) -> Option<JobDocument> {
-    match end(app, job, JobState::Failed, Some(&problem)).await {
-        Ok(document) => Some(document),
-        Err(_) => Some(JobDocument::at_end(
-            job,
-            JobState::Failed,
-            Some(problem.document(None)),
-        )),
-    }
+    end(app, job, JobState::Failed, Some(&problem)).await.ok()
 }
 
 /// Runs a job and records its end; `None` when it goes on after a restart.
@@ -232,18 +232,36 @@ async fn end(
     state: JobState,
     problem: Option<&Problem>,
 ) -> Result<JobDocument, Problem> {
+    let kind = problem.map(Problem::kind);
     let problem = problem.map(|problem| problem.document(None));
     let stored = problem
         .as_ref()
         .map(serde_json::to_string)
         .transpose()
         .map_err(Problem::internal)?;
-    app.catalogue
-        .end_job(&job.id, state, stored.as_deref())
-        .await?;
-    app.catalogue.forget_ended_jobs(JOBS_KEPT).await?;
+    let mut tries = 1;
+    let ended_now = loop {
+        let ended = app.catalogue.end_job(&job.id, state, stored.as_deref());
+        match ended.await {
+            Ok(ended_now) => break ended_now,
+            Err(error) if tries == MOST_ENDINGS => return Err(error.into()),
+            Err(_) => tokio::time::sleep(Duration::from_millis(100 << tries)).await,
+        }
+        tries += 1;
+    };
+    if !ended_now {
+        // It has an end already; that one counts.
+        let job = app.catalogue.job(&job.id).await?;
+        let gone = || Problem::internal("a job that ended is not on record");
+        return job.as_ref().map(JobDocument::of).ok_or_else(gone);
+    }
+    // The end is on record: what tidying up meets does not change it.
+    if let Err(error) = app.catalogue.forget_ended_jobs(JOBS_KEPT).await {
+        tracing::error!(%error, "ended jobs were not forgotten");
+    }
     if job.kind == JobKind::Ingest && state != JobState::Done {
-        ingesting::forget_upload(app, job).await?;
+        // A problem says in the log what it is about.
+        let _ = ingesting::forget_upload(app, job, kind).await;
     }
     Ok(JobDocument::at_end(job, state, problem))
 }

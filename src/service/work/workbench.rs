@@ -17,6 +17,7 @@ use crate::service::http::Problem;
 #[derive(Clone, Debug)]
 pub struct Workbench {
     places: Arc<Semaphore>,
+    in_all: usize,
     waiting: Arc<AtomicUsize>,
     most_waiting: usize,
 }
@@ -38,8 +39,10 @@ impl Workbench {
     /// So many places, and so many who may wait for one.
     #[must_use]
     pub fn new(places: usize, most_waiting: usize) -> Self {
+        let in_all = places.max(1);
         Self {
-            places: Arc::new(Semaphore::new(places.max(1))),
+            places: Arc::new(Semaphore::new(in_all)),
+            in_all,
             waiting: Arc::default(),
             most_waiting,
         }
@@ -65,7 +68,7 @@ impl Workbench {
     /// Computes at the next free place something long; the work may stop by [`call_off`].
     ///
     /// It has threads of its own, so that the system shares the processors: on common threads a blend would wait until
-    /// every line of a picture was drawn.
+    /// every line of a picture was drawn. As many as there are processors for each place that is taken, at least two.
     ///
     /// # Errors
     ///
@@ -74,8 +77,10 @@ impl Workbench {
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<Result<T, CalledOff>, Problem> {
-        let threads = rayon::current_num_threads();
+        let bench = self.clone();
         self.at_a_place(move || {
+            let taken = bench.in_all - bench.places.available_permits();
+            let threads = (rayon::current_num_threads() / taken.max(1)).max(2);
             match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
                 Ok(own) => own.install(work),
                 // The system has no threads to give.
