@@ -78,6 +78,14 @@ impl Layout {
             Self::Package => "package",
         }
     }
+
+    /// The layout of this name.
+    #[must_use]
+    pub fn by_name(name: &str) -> Option<Self> {
+        [Self::Rgl, Self::Mpi2005, Self::Merl, Self::Package]
+            .into_iter()
+            .find(|layout| layout.name() == name)
+    }
 }
 
 /// What a caller knows about a file that its bytes do not say.

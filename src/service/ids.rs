@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::store::Hash;
 
 /// Counts up when the same request would give other bytes: addresses and kept results of before are not met again.
-pub const MODEL: u32 = 3;
+pub const MODEL: u32 = 4;
 
 /// Hexadecimal digits after the prefix: 128 bits.
 const DIGITS: usize = 32;
@@ -29,6 +29,17 @@ pub fn made_of(prefix: &str, parts: &impl Serialize) -> String {
 pub fn key(what: &str, parts: &impl Serialize) -> Hash {
     let parts = serde_json::to_vec(&(what, MODEL, parts)).expect("plain data serialises");
     Hash::of(&parts)
+}
+
+/// The name of a request, by what its caller said: the same before and after an upgrade, as an idempotency key is.
+///
+/// # Panics
+///
+/// When the parts do not serialise, which plain data does.
+#[must_use]
+pub fn asked(what: &str, parts: &impl Serialize) -> String {
+    let parts = serde_json::to_vec(&(what, parts)).expect("plain data serialises");
+    Hash::of(&parts).to_string()
 }
 
 /// An id that nobody can guess.

@@ -104,7 +104,8 @@ impl App {
         if !self.catalogue.show_paint(id, visibility).await? {
             return Err(unknown_paint(id));
         }
-        self.shelf.invalidate(id).await;
+        // Its blends are as private as it is.
+        self.shelf.invalidate_all();
         Ok(())
     }
 

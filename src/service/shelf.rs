@@ -190,6 +190,15 @@ impl App {
             return Ok(None);
         };
         let options: BlendOptions = serde_json::from_str(&options).map_err(Problem::internal)?;
+        let mut visibility = Visibility::Published;
+        for paint in &paints {
+            // A paint that is gone says no more who may see it.
+            if let Some(paint) = self.catalogue.paint(paint).await?
+                && paint.visibility == Visibility::Private
+            {
+                visibility = Visibility::Private;
+            }
+        }
         let bytes = self.stored(file).await?;
         let (limits, works) = (self.config.limits, Arc::clone(&self.works));
         let shelve = move || -> Result<Shelved, Problem> {
@@ -210,7 +219,7 @@ impl App {
                 document,
                 file,
                 content: file,
-                visibility: Visibility::default(),
+                visibility,
                 measurement: None,
             })
         };

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::service::app::App;
-use crate::service::http::{Address, Answer, BlendProblems, Keep, Problem, Query};
+use crate::service::http::{Address, Answer, BlendProblems, Problem, Query};
 use crate::service::ids;
 use crate::service::parameters::ProfileText;
 use crate::service::work::WorkError;
@@ -49,7 +49,7 @@ pub async fn bundle(
         "blend_bundle",
         &(&blend.id, blend.file.to_string(), profile.export),
     );
-    let name = format!("{}.zip", blend.id);
+    let (name, keep) = (format!("{}.zip", blend.id), blend.keep());
     let on = app.clone();
     let compute = move || async move {
         let (works, counter) = (
@@ -65,6 +65,6 @@ pub async fn bundle(
         Ok(bytes.into())
     };
     let result = app.results.get_or_compute(key, compute).await?;
-    let answer = Answer::result("application/zip", result, Keep::ForEver).saved_as(&name);
+    let answer = Answer::result("application/zip", result, keep).saved_as(&name);
     Ok(answer.stage("bundle", begun.elapsed()))
 }

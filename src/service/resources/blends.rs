@@ -92,7 +92,7 @@ pub async fn create(
         clustered_so(&app, &order.paints, wanted, order.clusters.is_some()).await?;
     }
     let whole = (&order.paints, profile, target.max_error, target.max_seconds);
-    let claimed = ids::made_of("b_", &whole);
+    let claimed = ids::asked("blend", &whole);
     idempotency.claim(&app, &claimed).await?;
     let picked = if target.is_some() {
         let picked = pick(&app, &order.paints, target).await?;

@@ -16,7 +16,7 @@ use crate::service::parameters::view::{self, Side};
 use crate::service::parameters::{ProfileDocument, ProfileText, targets};
 use crate::service::shelf::Shelved;
 use crate::service::work::{
-    Asked, Estimate, Format, IngestOrder, PictureFormat, Shape, View, WorkError,
+    Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, Shape, View, WorkError,
 };
 use crate::store::LocalBlob;
 
@@ -91,7 +91,7 @@ pub struct EstimateDocument {
 
 /// What is needed to estimate.
 enum Needed {
-    Ingest(LocalBlob),
+    Ingest(LocalBlob, Option<Layout>),
     Blend(Vec<Arc<Shelved>>),
     Thing(Arc<Shelved>, Option<RealisationWeights>),
 }
@@ -122,6 +122,18 @@ pub async fn create(
     }
     let needed = order.needed(&app).await?;
     let works = Arc::clone(&app.works);
+    // The caller knows the paint, neither the file its upload is kept in nor the options it came with.
+    let kept_in = match &needed {
+        Needed::Ingest(local, _) => Some(local.path().display().to_string()),
+        _ => None,
+    };
+    let told = |error: WorkError| match &kept_in {
+        Some(file) => WorkError {
+            field: Some("paint".to_owned()),
+            ..error.without(file)
+        },
+        None => error,
+    };
     let estimated = app.bench.run(move || {
         order.with_asked(&needed, &profile, |asked| {
             if target.is_some() {
@@ -132,7 +144,9 @@ pub async fn create(
             }
         })
     });
-    let (estimate, met) = estimated.await?.map_err(WorkError::of_body)?;
+    let (estimate, met) = estimated
+        .await?
+        .map_err(|error| WorkError::of_body(told(error)))?;
     Ok(Answer::json(
         &EstimateDocument::of(&estimate, met),
         Keep::Never,
@@ -209,7 +223,10 @@ impl EstimateOrder {
                 let upload = paint.measurement.ok_or_else(none)?;
                 let local = app.blobs.local(upload).await?;
                 let gone = || Problem::internal(format!("upload {upload} is not there"));
-                Ok(Needed::Ingest(local.ok_or_else(gone)?))
+                let layout = paint
+                    .file_of_paint()
+                    .and_then(|file| Layout::by_name(&file.provenance.source));
+                Ok(Needed::Ingest(local.ok_or_else(gone)?, layout))
             }
             WorkName::Blend => {
                 let most = app.config.limits.paints;
@@ -263,8 +280,9 @@ impl EstimateOrder {
         then: impl FnOnce(&Asked<'_>) -> T,
     ) -> T {
         match needed {
-            Needed::Ingest(local) => {
+            Needed::Ingest(local, layout) => {
                 let order = IngestOrder {
+                    layout: *layout,
                     profile: *profile,
                     ..IngestOrder::default()
                 };

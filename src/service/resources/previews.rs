@@ -13,6 +13,7 @@ use crate::service::http::{
     Address, Answer, BlendProblems, Idempotency, Json, Keep, Kind, NoQuery, PaintProblems, Problem,
     ProblemDocument, Problems, Query, QueryOfTwo,
 };
+use crate::service::ids;
 use crate::service::parameters::view::{self, Side, ViewQuery};
 use crate::service::parameters::{ProfileDocument, ProfileText, WeightQuery};
 use crate::service::shelf::Shelved;
@@ -173,10 +174,9 @@ pub async fn create(
     };
     let view = view::view(&app, asked, &view::Names::BODY)?;
     let format = order.format.unwrap_or(PreviewFormat::Png);
-    let key = drawing::key(&thing, weights.as_ref(), &view, format.drawn());
-    idempotency
-        .claim(&app, &format!("{key} {format:?}"))
-        .await?;
+    let whole = (&thing.id, &weights, &view, format);
+    let claimed = ids::asked("preview", &whole);
+    idempotency.claim(&app, &claimed).await?;
     let drawn = drawing::draw(&app, thing, weights, format.drawn(), view).await;
     Ok(answer(drawn.map_err(Problem::in_body)?, format, None))
 }

@@ -174,7 +174,7 @@ async fn accept(
         target.max_error,
         target.max_seconds,
     );
-    let claimed = idempotency.claim(&app, &ids::made_of("p_", &whole)).await;
+    let claimed = idempotency.claim(&app, &ids::asked("paint", &whole)).await;
     let mut picked = None;
     let ready = match claimed {
         Ok(()) if target.is_some() => {
