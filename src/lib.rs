@@ -7,6 +7,25 @@
 //!                                  ▲                 │
 //!                              transport             └────────▶ render ─▶ PNG, EXR
 //! ```
+//!
+//! | room | what lives there |
+//! |---|---|
+//! | [`color`] | white points, XYZ, Lab, color differences |
+//! | [`transport`] | optimal transport of point clouds: numbers only, no paint |
+//! | [`descent`] | damped least squares, as several fits take their steps |
+//! | [`paint`] | what a paint is: coat, lobes, color table, flakes, their reflectance and their file |
+//! | [`measurement`] | what labs hand in: bytes in, tables and pictures out |
+//! | [`fit`] | measurement to paint: lobes, color table, clusters of flakes, grain, lifetime |
+//! | [`blend`] | which flakes of one paint become which of another, and paints at any weights of it |
+//! | [`render`] | scene, shading, film: the preview |
+//! | [`export`] | texture bundle, glTF, readings |
+//! | [`accuracy`] | profiles, and how far a result is from the most accurate one |
+//! | [`workshop`] | the use cases, which read files and know the clock; what both doors call |
+//! | [`store`] | what outlives the process: blobs, catalogue, results |
+//! | [`service`], [`studio`], [`cli`] | the doors: HTTP, its web page, the command line |
+//!
+//! Rooms up to [`accuracy`] are pure: no clock, no network, no files, no chance; the same arguments give the same bytes
+//! on any number of threads. Which room may use which stands in `tests/architecture.rs`, where it is tested.
 
 pub mod accuracy;
 pub mod blend;

@@ -1,8 +1,11 @@
-//! Accuracy: the profiles that trade time against it.
+//! Accuracy: the profiles that trade time against it, and what a result's profile costs in it.
 //!
 //! Every room owns its settings; a [`Profile`] is those settings together, handed down as they are. No room below asks
 //! what the profile is called. What a result's settings cost in accuracy is measured here: [`clustering_error`] of an
 //! ingest, [`blend_deviation`] of a correspondence, [`writing_error`] of a file, [`sparkle`] of any paint.
+//!
+//! Promised: an error is measured or bounded, says which, and is none at all where it is not known. Left to others: time,
+//! which only `workshop` can measure; picking a profile for a target (`workshop`).
 
 mod clustering;
 mod correspondence;

@@ -4,7 +4,7 @@
 //! perfect diffuser under that same white. A Lab value that came from elsewhere travels with its illuminant and
 //! observer as a [`ReadingLab`]. Arithmetic is `f64`.
 //!
-//! Left to others: tone mapping for a screen (`render`), spectra (`measurement`).
+//! Left to others: tone mapping for a screen (`render`). Spectra are turned into colors nowhere yet.
 
 mod adaptation;
 mod difference;

@@ -2,12 +2,11 @@
 //!
 //! One file per format, each a function from a paint to bytes: [`bundle`] (a `.zip` of textures, shader and
 //! `material.json`), [`material_json`] (the same in one JSON), [`glb`] (a fitted glTF material that carries the
-//! statistical flakes beside it); [`readings`], what an instrument would
-//! say; and [`blend_bundle`], from a whole blend to one `.zip` whose shader mixes the paints
-//! at any weights. The same paint, [`About`] and [`ExportSettings`] give the same bytes on every machine
-//! that rounds alike; neither a clock nor the output's own name gets in.
+//! statistical flakes beside it); [`readings`], what an instrument would say; and [`blend_bundle`], from a whole blend to
+//! one `.zip` whose shader mixes the paints at any weights. The same paint, [`About`] and [`ExportSettings`] give the same
+//! bytes on every machine that rounds alike; neither a clock nor the output's own name gets in.
 //!
-//! Left to others: pictures (`render`), mixing (`blend`), compressing for the wire (`service`).
+//! Left to others: pictures (`render`), mixing (`blend`).
 
 mod alias;
 mod blend_bundle;

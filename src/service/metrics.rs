@@ -92,6 +92,7 @@ impl Metrics {
             Method::HEAD => "HEAD",
             Method::POST => "POST",
             Method::DELETE => "DELETE",
+            Method::PATCH => "PATCH",
             _ => "other",
         };
         let labels = vec![

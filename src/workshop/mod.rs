@@ -1,7 +1,9 @@
-//! The use cases: ingest, blend, realise, preview, evaluate, show. What both doors, HTTP and command line, call.
+//! The use cases: ingest, blend, realise, bundle, preview, evaluate, describe; the estimate of each and the profile that
+//! meets a target; the self-test; the study. What both doors, HTTP and command line, call.
 //!
-//! Functions here are synchronous and compute; they read the files they are told to read and write none. Long work takes
-//! a function that hears the share done. Every failure is a [`WorkshopError`] that says whose fault it is.
+//! Functions here are synchronous and compute; they read the files they are told to read, and give bytes to whoever keeps
+//! them. Only estimates and the study look at a clock, and write a file of no name to learn what writing takes. Long work
+//! takes a function that hears the share done. Every failure is a [`WorkshopError`] that says whose fault it is.
 
 mod blending;
 mod bundling;
