@@ -49,15 +49,15 @@ pub fn check_headers(app: &App, headers: &HeaderMap) -> Result<(), Problem> {
         .and_then(|length| length.parse().ok())
         .unwrap_or(0);
     if announced > app.config.limits.bytes {
-        Err(too_large(app))
+        Err(too_large(app.config.limits.bytes))
     } else {
         Ok(())
     }
 }
 
-fn too_large(app: &App) -> Problem {
+fn too_large(most: u64) -> Problem {
     Problem::new(Kind::TooLarge, "The upload is too large.")
-        .accepting(format!("up to {} bytes", app.config.limits.bytes))
+        .accepting(format!("up to {most} bytes of such a file"))
 }
 
 /// Takes in what is refused, within reason: who still sends does not listen.
@@ -83,6 +83,8 @@ pub async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Probl
     let mut writer = app.blobs.begin().await?;
     let mut pieces = body.into_data_stream();
     let (mut length, begun) = (0, Instant::now());
+    // Only an archive is unpacked file by file; anything else would be held in memory as a whole.
+    let mut most = app.config.limits.bytes;
     loop {
         let piece = match tokio::time::timeout(SILENCE, pieces.next()).await {
             Ok(None) => break,
@@ -101,11 +103,14 @@ pub async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Probl
                 return Err(Problem::new(Kind::RequestTimeout, detail));
             }
         };
+        if length == 0 && !piece.is_empty() && !piece.starts_with(b"P") {
+            most = most.min(app.config.limits.table_bytes);
+        }
         length += piece.len() as u64;
-        if length > app.config.limits.bytes {
+        if length > most {
             drop(writer);
             drain(pieces).await;
-            return Err(too_large(app));
+            return Err(too_large(most));
         }
         if begun.elapsed() > SILENCE + Duration::from_secs(length / LEAST_RATE) {
             let detail = format!(
