@@ -16,6 +16,8 @@ use crate::workshop::WorkshopError;
 ///
 /// The data folder holds a SQLite catalogue and a folder of blobs; what was acknowledged survives a kill. Stop with
 /// Ctrl-C or SIGTERM: requests under way are answered, jobs go on at the next start.
+///
+/// Whoever reaches the address may read, upload and delete: beyond this machine, put a proxy in front that asks who calls.
 #[derive(Args, Clone, Debug)]
 pub struct Serve {
     /// Address to listen on.
@@ -60,6 +62,12 @@ impl Serve {
             })
         })?;
         let address = listener.local_addr().map_err(WorkshopError::internal)?;
+        if !address.ip().is_loopback() {
+            tracing::warn!(
+                %address,
+                "whoever reaches this address may read, upload and delete; put a proxy in front that asks who calls"
+            );
+        }
         let config = ServiceConfig::new(self.data.clone());
         let app = service::open(config, Arc::new(Workshop::new(Limits::default())))
             .await

@@ -11,7 +11,8 @@
 //! | `shelf`, `keeping` | paints and blends as they are read, kept and removed |
 //!
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
-//! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`).
+//! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`),
+//! who calls: whoever reaches the service may do all it does, and what is private is only left out of lists.
 
 mod app;
 mod http;
@@ -62,6 +63,8 @@ pub struct ServiceConfig {
     pub header_time: Duration,
     /// Longest time for a JSON body.
     pub body_time: Duration,
+    /// Longest time in which a caller takes nothing of its answer.
+    pub write_time: Duration,
     /// Longest time for requests under way when the service goes down.
     pub grace: Duration,
 }
@@ -81,6 +84,7 @@ impl ServiceConfig {
             most_connections: 1024,
             header_time: Duration::from_secs(10),
             body_time: Duration::from_secs(10),
+            write_time: Duration::from_secs(30),
             grace: Duration::from_secs(5),
         }
     }

@@ -14,6 +14,7 @@ use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
+use tokio_io_timeout::TimeoutStream;
 use tower::ServiceBuilder;
 use tower::limit::GlobalConcurrencyLimitLayer;
 
@@ -157,7 +158,7 @@ pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = (
             () = &mut stop => break,
         };
         let connection = builder.serve_connection(
-            TokioIo::new(stream),
+            TokioIo::new(Box::pin(held_to_pace(stream, app.config.write_time))),
             TowerToHyperService::new(router.clone()),
         );
         let connection = graceful.watch(connection.into_owned());
@@ -177,6 +178,13 @@ pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = (
         }
     })
     .await;
+}
+
+/// A connection that ends when its peer takes nothing of an answer for so long.
+fn held_to_pace(stream: TcpStream, write_time: Duration) -> TimeoutStream<TcpStream> {
+    let mut stream = TimeoutStream::new(stream);
+    stream.set_write_timeout(Some(write_time));
+    stream
 }
 
 /// The next connection. Where the system has none to give it is asked again a little later.

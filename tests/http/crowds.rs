@@ -131,3 +131,24 @@ async fn more_requests_than_are_taken_are_refused_at_once_and_health_answers_sti
     }
     house.close().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_asks_and_does_not_read_is_not_waited_for() {
+    let data = folder();
+    let config = ServiceConfig {
+        most_connections: 1,
+        write_time: Duration::from_millis(300),
+        ..ServiceConfig::new(data.path().to_owned())
+    };
+    let house = House::with(config).await;
+    let mut deaf = tokio::net::TcpStream::connect(house.address)
+        .await
+        .expect("connects");
+    // More than the buffers of both ends hold.
+    let page = "GET /openapi.json HTTP/1.1\r\nHost: x\r\n\r\n".repeat(400);
+    let _ = tokio::time::timeout(Duration::from_secs(1), deaf.write_all(page.as_bytes())).await;
+    let next = tokio::time::timeout(Duration::from_secs(20), house.get("/healthz")).await;
+    assert_eq!(next.expect("the only connection is free again").status, 200);
+    drop(deaf);
+    house.close().await;
+}
