@@ -237,7 +237,6 @@ mod tests {
     use super::*;
     use crate::fit::{BoxRule, ClusterSettings, FlakeRecipe, SimulatedPatch, fit_flakes};
     use crate::paint::{ColorTable, Lobe};
-    use std::ops::ControlFlow;
 
     fn error_of(settings: &ClusterSettings) -> ClusteringError {
         let lobes = vec![
@@ -265,7 +264,7 @@ mod tests {
             ..FlakeRecipe::default()
         };
         let patch = SimulatedPatch::new(&paint, &recipe).expect("in range");
-        let fitted = fit_flakes(&patch, settings, &|_, _| ControlFlow::Continue(())).expect("fits");
+        let fitted = fit_flakes(&patch, settings, &|_, _| ()).expect("fits");
         paint.flakes = Some(fitted.flakes);
         let predicted = predicted_clustering_error(&patch, &paint, settings);
         let error = clustering_error(&patch, &paint).expect("flakes");

@@ -4,8 +4,7 @@
 //! of them. For grain and lifetime the luminance of one row and one column of slices is kept: the slices of the smallest
 //! θh, and those of the third θd, which lies clear of the grid's border.
 
-use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
@@ -65,13 +64,10 @@ pub enum FlakeFitError {
         /// Most that is accepted.
         high: f64,
     },
-    /// The caller asked to stop.
-    #[error("the fit was stopped")]
-    Stopped,
 }
 
-/// Told after each slice: how many are done, of how many. [`ControlFlow::Break`] stops the fit.
-pub type Progress<'a> = &'a (dyn Fn(usize, usize) -> ControlFlow<()> + Sync);
+/// Told after each slice: how many are done, of how many. It does not return when the work was called off.
+pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// Fits the flakes of a paint.
 ///
@@ -101,13 +97,10 @@ pub fn fit_flakes(
     }
     let (slices, columns) = (pictures.slices(), pictures.theta_d().len());
     let column = columns.min(3) - 1;
-    let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let done = AtomicUsize::new(0);
     let fitted: Vec<Result<FittedSlice, FlakeFitError>> = (0..slices)
         .into_par_iter()
         .map_init(<(SliceRoom, Clusterer)>::default, |(room, clusterer), k| {
-            if stopped.load(Ordering::Relaxed) {
-                return Err(FlakeFitError::Stopped);
-            }
             pictures.read(k, room)?;
             let planes = room.picture.planes.each_ref().map(Vec::as_slice);
             let clusters = clusterer.cluster(planes, settings);
@@ -117,15 +110,10 @@ pub fn fit_flakes(
             })?;
             let probed = k < columns || k % columns == column;
             let light = probed.then(|| luminance_of(planes, room.picture.width));
-            if progress(done.fetch_add(1, Ordering::Relaxed) + 1, slices).is_break() {
-                stopped.store(true, Ordering::Relaxed);
-            }
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, slices);
             Ok(FittedSlice { clusters, light })
         })
         .collect();
-    if stopped.load(Ordering::Relaxed) {
-        return Err(FlakeFitError::Stopped);
-    }
     let fitted = fitted.into_iter().collect::<Result<Vec<_>, _>>()?;
     let warnings = warnings(pictures, &fitted);
     let texture = FlakeTexture {

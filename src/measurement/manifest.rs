@@ -1,14 +1,13 @@
 //! `paint.json`, the manifest of a measured-paint package: what it says, checked field by field.
 //!
-//! A refusal names the field as a path, the value and what is accepted. A key that the format does not know is not
-//! refused, since labs keep notes of their own, but it is told, since it may be a misspelt one.
+//! A refusal names the field as a path, the value and what is accepted. A key that stands twice is refused. One that the
+//! format does not know is not, since labs keep notes of their own, but it is told, since it may be a misspelt one.
 
 mod base;
 mod field;
 mod readings;
 mod slices;
-
-use serde_json::Value;
+mod unique;
 
 pub use self::base::TableLayout;
 use self::base::base;
@@ -18,6 +17,7 @@ pub use self::readings::MultiAngle;
 use self::readings::multi_angle;
 pub(super) use self::slices::FlakesEntry;
 use self::slices::flakes;
+use self::unique::Unique;
 use super::package::PackageError;
 use crate::paint::{Coat, Limits};
 
@@ -41,11 +41,17 @@ pub(super) struct Manifest {
 impl Manifest {
     /// Reads a manifest.
     pub(super) fn parse(bytes: &[u8], limits: &Limits) -> Result<Self, PackageError> {
-        let value: Value =
-            serde_json::from_slice(bytes).map_err(|error| PackageError::Damaged {
+        let Unique(value) = serde_json::from_slice(bytes).map_err(|error| {
+            let reason = if error.is_data() {
+                error.to_string()
+            } else {
+                format!("no JSON: {error}")
+            };
+            PackageError::Damaged {
                 file: MANIFEST.into(),
-                reason: format!("no JSON: {error}"),
-            })?;
+                reason,
+            }
+        })?;
         let root = Field {
             path: String::new(),
             value: &value,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use moka::future::Cache;
-use tokio::sync::{RwLock, watch};
+use tokio::sync::{Mutex, RwLock, watch};
 
 use super::ServiceConfig;
 use super::http::Problem;
@@ -42,6 +42,8 @@ pub struct Shared {
     pub metrics: Metrics,
     /// Read while a blob is written and not yet named by a record, written while unnamed blobs are removed.
     pub removal: RwLock<()>,
+    /// Held while colors of paints are read that were not noted.
+    pub reading: Mutex<()>,
     /// Paints and blends as they were last read.
     pub shelf: Cache<String, Arc<Shelved>>,
     ready: AtomicBool,
@@ -108,6 +110,7 @@ impl App {
             watchers: Watchers::default(),
             metrics: Metrics::new(),
             removal: RwLock::new(()),
+            reading: Mutex::new(()),
             shelf,
             ready: AtomicBool::new(false),
             stopping: watch::Sender::new(false),

@@ -1,8 +1,11 @@
 //! What is kept and what is removed: a record names blobs, and a blob that none names goes.
 
+use std::sync::Arc;
+
 use super::app::App;
 use super::http::Problem;
 use super::shelf::unknown_paint;
+use super::work::{Thing, colors};
 use crate::paint::PaintFile;
 use crate::store::{BlobBytes, Hash, PaintRecord, Visibility};
 
@@ -41,21 +44,33 @@ impl App {
         measurement: Option<Hash>,
     ) -> Result<(), Problem> {
         let _writing = self.removal.read().await;
-        let hashed = tokio::task::spawn_blocking(move || {
-            (file.to_bytes(), Hash::from(file.paint.content_hash()), file)
+        let works = Arc::clone(&self.works);
+        let worked_out = tokio::task::spawn_blocking(move || {
+            let content = Hash::from(file.paint.content_hash());
+            let (bytes, name, source) = (
+                file.to_bytes(),
+                file.name.clone(),
+                file.provenance.source.clone(),
+            );
+            let colors = colors::read(&*works, &Thing::Paint(Box::new(file)));
+            (bytes, content, name, source, colors)
         });
-        let (bytes, content, file) = hashed.await.map_err(Problem::internal)?;
+        let (bytes, content, name, source, colors) = worked_out.await.map_err(Problem::internal)?;
         let paint = self.blobs.put(bytes.into()).await?.hash;
         let record = PaintRecord {
             id: id.to_owned(),
-            name: file.name,
-            source: file.provenance.source,
+            name,
+            source,
             measurement,
             paint,
             content,
             visibility: Visibility::default(),
         };
         self.catalogue.add_paint(&record).await?;
+        // What is not noted now is when somebody asks for it; the paint is kept all the same.
+        if let Ok(colors) = colors {
+            let _ = colors::note(self, paint, &colors).await;
+        }
         Ok(())
     }
 

@@ -44,6 +44,17 @@ pub struct PaintPage {
     pub next: Option<i64>,
 }
 
+/// A paint with the numbers that were noted of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NotedPaint {
+    /// Address.
+    pub id: String,
+    /// Blob of the `.paint` file.
+    pub paint: Hash,
+    /// What was noted of the blob; `None` when nothing was yet.
+    pub numbers: Option<Vec<f64>>,
+}
+
 /// A blend that was computed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BlendRecord {
@@ -143,6 +154,18 @@ pub trait Paints: Send + Sync {
 
     /// Changes whether lists show a paint; `false` when there is none.
     fn show_paint<'a>(&'a self, id: &'a str, visibility: Visibility) -> Task<'a, bool>;
+
+    /// Notes numbers of a paint's blob, in place of those of this kind before. They go when no paint has the blob.
+    fn note<'a>(&'a self, paint: Hash, kind: &'a str, numbers: &'a [f64]) -> Task<'a, ()>;
+
+    /// All paints of this visibility whose name or source contains `q`, whatever the case, in the order they came, with
+    /// what was noted of this kind.
+    fn noted<'a>(
+        &'a self,
+        q: Option<&'a str>,
+        visibility: Visibility,
+        kind: &'a str,
+    ) -> Task<'a, Vec<NotedPaint>>;
 
     /// Removes a paint and hands out what was on record.
     fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>>;

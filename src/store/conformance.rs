@@ -165,6 +165,22 @@ async fn records_conform(catalogue: &dyn Catalogue) {
             "{q}"
         );
     }
+    let noted = async |q| {
+        let noted = catalogue.noted(q, Visibility::Published, "kind").await;
+        let noted = noted.expect("lists").into_iter();
+        noted.map(|paint| paint.numbers).collect::<Vec<_>>()
+    };
+    assert_eq!(noted(None).await, [None, None, None]);
+    let blob = Hash::of(b"p_2");
+    for numbers in [[1.0, -2.0], [0.1, 1e-300]] {
+        catalogue.note(blob, "kind", &numbers).await.expect("notes");
+        catalogue.note(blob, "other", &[9.0]).await.expect("notes");
+    }
+    assert_eq!(noted(None).await, [None, Some(vec![0.1, 1e-300]), None]);
+    assert_eq!(noted(Some("BLUE")).await.len(), 2);
+    let nobody = catalogue.note(Hash::of(b"p_9"), "kind", &[1.0]).await;
+    nobody.expect("notes nothing");
+
     let list = |visibility| catalogue.paints(None, visibility, None, 10);
     let hidden = catalogue.show_paint("p_2", Visibility::Private).await;
     assert!(hidden.expect("changes"));

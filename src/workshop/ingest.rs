@@ -154,6 +154,15 @@ fn ingest_called(
     Ok(file)
 }
 
+/// Whether an upload is a `.paint`, which is taken as it is and not fitted.
+///
+/// # Errors
+///
+/// [`WorkshopError`] when the upload cannot be read.
+pub fn is_paint_file(path: &Path) -> Result<bool, WorkshopError> {
+    Ok(PaintFile::recognises(&first_bytes(path)?))
+}
+
 /// Ingests an upload: a measurement, or a `.paint` that this program wrote. `path` is where the upload is kept, which
 /// its owner does not know and errors do not name.
 ///
@@ -171,7 +180,7 @@ pub fn ingest_upload(
             .replace(&path.display().to_string(), "the upload"),
         ..error
     };
-    if !PaintFile::recognises(&first_bytes(path)?) {
+    if !is_paint_file(path)? {
         // The file is called by the hash of its bytes, which is no name: better what it says about itself.
         let description =
             |bare: &BareMeasurement| bare.brdf.description().unwrap_or_default().to_owned();

@@ -32,12 +32,12 @@ pub use estimate::{Estimate, EstimatedError, Stage, Work, sample_to_estimate};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{
     BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, check_clusters, ingest,
-    ingest_in_stages, ingest_upload, open_measurement,
+    ingest_in_stages, ingest_upload, is_paint_file, open_measurement,
 };
 pub use previewing::{
     Light, MOST_SAMPLES, PictureFormat, PreviewOptions, preview, read_environment, texels,
 };
-pub use reading::{MOST_ANGLES, readings};
+pub use reading::{MOST_ANGLES, color_difference, readings};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
 pub use selftest::{Check, selftest};

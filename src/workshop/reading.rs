@@ -1,6 +1,7 @@
 //! A paint under a virtual multi-angle instrument.
 
 use super::error::WorkshopError;
+use crate::color::{Lab, ciede2000};
 use crate::export::{self, Readings};
 use crate::paint::{ASPECULAR_DEG, PaintFile};
 
@@ -25,4 +26,10 @@ pub fn readings(
         return Err(WorkshopError::usage("angles", message));
     }
     export::readings(&paint.paint, angles).map_err(|error| WorkshopError::usage("angles", error))
+}
+
+/// CIEDE2000 between two readings, L, a, b each.
+#[must_use]
+pub fn color_difference(x: [f64; 3], y: [f64; 3]) -> f64 {
+    ciede2000(Lab::from(x), Lab::from(y))
 }

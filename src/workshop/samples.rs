@@ -9,8 +9,6 @@
 //! `2k_acrylack` (a plain two-component acrylic), blue and `blue_matte` carry their color in the diffuse albedo under lobes
 //! of a lacquer's reflectance or of little weight: they are solid colors.
 
-use std::ops::ControlFlow;
-
 use super::WorkshopError;
 use super::ingest::finish;
 use crate::accuracy::{Profile, clustering_error};
@@ -252,7 +250,6 @@ impl Sample {
             let tell = |done: usize, of: usize| {
                 #[allow(clippy::cast_precision_loss)] // a progress bar
                 progress(done as f32 / of as f32);
-                ControlFlow::Continue(())
             };
             let refused = |e| WorkshopError::usage("clusters", e);
             let fitted = fit_flakes(&patch, &profile.flakes, &tell).map_err(refused)?;

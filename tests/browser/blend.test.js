@@ -3,52 +3,32 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 
 import { blendAt, readPaint } from "../../src/export/shader/carpaint.js";
-import { launch } from "./browser.js";
-import { fixtures, serve } from "./server.js";
+import { fixtures } from "./server.js";
+import { address, browser, distance, expected, openShaderPage, shade } from "./shader_page.js";
 
-let [browser, page, server, address] = [];
+openShaderPage();
 
-before(async () => {
-  ({ server, address } = await serve());
-  browser = await launch();
-  page = await browser.newPage();
-  await page.goto(`${address}/page/shade.html`);
-  await page.waitForSelector("body[data-ready]", { state: "attached" });
-});
-
-after(async () => {
-  await browser?.close();
-  server?.close();
-});
-
-const cases = async (name) => JSON.parse(await readFile(join(fixtures, `${name}_expected.json`), "utf8"));
 const bundle = async (name) => readPaint(await readFile(join(fixtures, `${name}.zip`)));
-const shade = (name, inputs, body, weights) =>
-  page.evaluate(([n, i, b, w]) => window.shade(n, i, b, "", w), [name, inputs, body, weights]);
 const told = ({ weights, base, flakeLightness, flakeColor, flakeSaturation }) =>
   [weights, base, flakeLightness, flakeColor, flakeSaturation].map((w) => `[${w}]`).join(" ");
-
-// Largest difference relative to the color's largest channel, with a floor of `black`.
-const distance = (got, want, black) =>
-  Math.max(...want.map((w, k) => Math.abs(got[k] - w))) / Math.max(black, ...want.map(Math.abs));
 const worst = (list, get) => Math.max(...list.map(get));
 
 for (const name of ["duo", "trio"]) {
   // Halves of corners round at 0.03 Lab; floats only as a GPU does.
   for (const [precision, tolerance] of [["f32", 1e-4], ["f16", 0.01]]) {
     test(`${name} in ${precision}: 50 direction pairs at every weights shade to what evaluate finds, within ${100 * tolerance} %`, async () => {
-      for (const { weights, pairs, slices } of await cases(name)) {
+      for (const { weights, pairs, slices } of await expected(name)) {
         assert.equal(pairs.length, 50);
         const directions = pairs.map(({ wi, wo }) => [wi, wo]);
         const whole = await shade(`${name}_${precision}`, directions,
-          "answer = vec4(carpaint_evaluate(given(0).xyz, given(1).xyz), carpaint_mirror(given(1).xyz));", weights);
+          "answer = vec4(carpaint_evaluate(given(0).xyz, given(1).xyz), carpaint_mirror(given(1).xyz));", { weights });
         const base = await shade(`${name}_${precision}`, directions,
-          "answer.rgb = carpaint_terms(given(0).xyz, given(1).xyz).base;", weights);
+          "answer.rgb = carpaint_terms(given(0).xyz, given(1).xyz).base;", { weights });
         const means = await shade(`${name}_${precision}`, slices.map(({ angles }) => [angles]),
-          "answer.rgb = carpaint_flakes_mean(given(0).x, given(0).y);", weights);
+          "answer.rgb = carpaint_flakes_mean(given(0).x, given(0).y);", { weights });
         const off = [
           worst(pairs, ({ f }, k) => distance(whole[k], f, 1e-4)),
           worst(pairs, (pair, k) => distance(base[k], pair.base, 1e-4)),
@@ -63,10 +43,10 @@ for (const name of ["duo", "trio"]) {
 
   for (const [precision, tolerance] of [["f32", 1e-4], ["f16", 0.01]]) {
     test(`${name} in ${precision}: 400 texels at every weights show the flakes that carpaint draws`, async () => {
-      for (const { weights, texels } of await cases(name)) {
+      for (const { weights, texels } of await expected(name)) {
         const got = await shade(`${name}_${precision}`, texels.map(({ texel, angles }) => [texel, angles]), `
           uint cell = carpaint_cell(ivec2(given(0).xy));
-          answer = vec4(carpaint_flakes(cell, given(1).x, given(1).y), float(cell >> 8u));`, weights);
+          answer = vec4(carpaint_flakes(cell, given(1).x, given(1).y), float(cell >> 8u));`, { weights });
         texels.forEach(({ cell }, k) => assert.equal(got[k][3], cell >>> 8, `cell of texel ${k}`));
         const off = worst(texels, ({ color }, k) => distance(got[k], color, 0.02));
         console.log(`  ${told(weights)}: worst relative difference ${off.toExponential(2)}`);
@@ -78,7 +58,7 @@ for (const name of ["duo", "trio"]) {
   test(`${name}: coat, diffuse, lobes and grain at every weights are those of the realisation`, async () => {
     const paint = await bundle(`${name}_f32`);
     const near = (got, want, what) => assert.ok(Math.abs(got - want) <= 1e-12 * Math.max(1, Math.abs(want)), `${what}: ${got}, not ${want}`);
-    for (const { weights, paint: want } of await cases(name)) {
+    for (const { weights, paint: want } of await expected(name)) {
       const { material } = blendAt(paint, weights);
       assert.equal(material.coat === null, want.coat === null);
       for (const key of ["ior", "roughness"]) if (want.coat) near(material.coat[key], want.coat[key], key);
@@ -97,8 +77,8 @@ for (const name of ["duo", "trio"]) {
 }
 
 test("eight bits a corner keep the slice means of a blend within 3 %", async () => {
-  for (const { weights, slices } of (await cases("duo")).slice(0, 2)) {
-    const got = await shade("duo_8bit", slices.map(({ angles }) => [angles]), "answer.rgb = carpaint_flakes_mean(given(0).x, given(0).y);", weights);
+  for (const { weights, slices } of (await expected("duo")).slice(0, 2)) {
+    const got = await shade("duo_8bit", slices.map(({ angles }) => [angles]), "answer.rgb = carpaint_flakes_mean(given(0).x, given(0).y);", { weights });
     const off = worst(slices, ({ mean }, k) => distance(got[k], mean, 1e-3));
     console.log(`  ${told(weights)}: ${off.toExponential(2)}`);
     assert.ok(off < 0.03);

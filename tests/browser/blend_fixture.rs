@@ -6,11 +6,11 @@ use std::path::Path;
 
 use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::color::Lab;
-use carpaint::export::{ExportSettings, Precision, blend_bundle};
+use carpaint::export::blend_bundle;
 use carpaint::paint::{AngleGrid, CarPaint, Coat, ColorTable, Lobe};
 use serde_json::{Value, json};
 
-use super::{Anything, about, checked, expected, silver, solid, tile_of};
+use super::{Anything, about, checked, expected, silver, solid, tile_of, write_each_precision};
 
 pub fn write(folder: &Path) -> Result<(), Anything> {
     let (silver, copper, solid) = (silver()?, copper()?, solid()?);
@@ -25,20 +25,9 @@ pub fn write(folder: &Path) -> Result<(), Anything> {
             .map(|&(name, paint)| Ingredient { name, paint })
             .collect();
         let blend = Blend::new(&ingredients, &BlendSettings::default(), &|_| ())?;
-        for (suffix, precision) in [
-            ("f32", Precision::F32),
-            ("f16", Precision::F16),
-            ("8bit", Precision::Eight),
-        ] {
-            let settings = ExportSettings {
-                precision,
-                ..ExportSettings::default()
-            };
-            std::fs::write(
-                folder.join(format!("{name}_{suffix}.zip")),
-                blend_bundle(&blend, &about(name), &settings)?,
-            )?;
-        }
+        write_each_precision(folder, name, |settings| {
+            Ok(blend_bundle(&blend, &about(name), settings)?)
+        })?;
         let cases = cases
             .iter()
             .map(|weights| case(&blend, weights))

@@ -3,33 +3,12 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 
-import { launch } from "./browser.js";
-import { fixtures, serve } from "./server.js";
+import { fixtures } from "./server.js";
+import { address, browser, distance, expected, openShaderPage, shade } from "./shader_page.js";
 
-let [browser, page, server, address] = [];
-
-before(async () => {
-  ({ server, address } = await serve());
-  browser = await launch();
-  page = await browser.newPage();
-  await page.goto(`${address}/page/shade.html`);
-  await page.waitForSelector("body[data-ready]", { state: "attached" });
-});
-
-after(async () => {
-  await browser?.close();
-  server?.close();
-});
-
-const expected = async (name) => JSON.parse(await readFile(join(fixtures, `${name}_expected.json`), "utf8"));
-const shade = (name, inputs, body, defines = "") =>
-  page.evaluate(([n, i, b, d]) => window.shade(n, i, b, d), [name, inputs, body, defines]);
-
-// Largest difference relative to the color's largest channel, with a floor of `black`.
-const distance = (got, want, black) =>
-  Math.max(...want.map((w, k) => Math.abs(got[k] - w))) / Math.max(black, ...want.map(Math.abs));
+openShaderPage();
 
 for (const name of ["silver", "solid"]) {
   for (const precision of ["f32", "f16"]) {
@@ -88,7 +67,7 @@ test("the alias table and the cumulative draw have the same mean", async () => {
       sum += carpaint_slice(1, 2, draw);
     }
     answer.rgb = sum / ${draws}.0;`;
-  const [[cumulative], [alias]] = [await shade("silver_f32", inputs, body), await shade("silver_f32", inputs, body, "#define CARPAINT_ALIAS\n")];
+  const [[cumulative], [alias]] = [await shade("silver_f32", inputs, body), await shade("silver_f32", inputs, body, { defines: "#define CARPAINT_ALIAS\n" })];
   const { slices } = await expected("silver");
   const { mean } = slices[1 * 5 + 2];
   console.log(`  cumulative ${distance(cumulative, mean, 0).toExponential(2)}, alias ${distance(alias, mean, 0).toExponential(2)} off the closed form`);

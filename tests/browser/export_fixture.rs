@@ -27,20 +27,9 @@ fn main() -> Result<(), Anything> {
         ("solid", solid()?),
     ] {
         let about = about(name);
-        for (suffix, precision) in [
-            ("f32", Precision::F32),
-            ("f16", Precision::F16),
-            ("8bit", Precision::Eight),
-        ] {
-            let settings = ExportSettings {
-                precision,
-                ..ExportSettings::default()
-            };
-            std::fs::write(
-                folder.join(format!("{name}_{suffix}.zip")),
-                bundle(&paint, &about, &settings)?,
-            )?;
-        }
+        write_each_precision(folder, name, |settings| {
+            Ok(bundle(&paint, &about, settings)?)
+        })?;
         let settings = ExportSettings::default();
         std::fs::write(
             folder.join(format!("{name}.json")),
@@ -53,6 +42,27 @@ fn main() -> Result<(), Anything> {
         )?;
     }
     blend_fixture::write(folder)
+}
+
+/// Writes a bundle in every precision there is.
+fn write_each_precision(
+    folder: &Path,
+    name: &str,
+    bundle: impl Fn(&ExportSettings) -> Result<Vec<u8>, Anything>,
+) -> Result<(), Anything> {
+    for (suffix, precision) in [
+        ("f32", Precision::F32),
+        ("f16", Precision::F16),
+        ("8bit", Precision::Eight),
+    ] {
+        let settings = ExportSettings {
+            precision,
+            ..ExportSettings::default()
+        };
+        let file = folder.join(format!("{name}_{suffix}.zip"));
+        std::fs::write(file, bundle(&settings)?)?;
+    }
+    Ok(())
 }
 
 fn about(name: &str) -> About {

@@ -40,24 +40,9 @@ async fn too_much_work_is_turned_away_with_a_time_to_come_back() {
         answer.problem(503, "overloaded");
         assert!(answer.header("retry-after").is_some());
     }
-    let first = house
-        .ask(
-            "POST",
-            "/v1/paints",
-            &[("Prefer", "respond-async")],
-            b"slow four",
-        )
-        .await;
+    let first = house.submit(b"slow four").await;
     assert_eq!(first.status, 202);
-    house
-        .ask(
-            "POST",
-            "/v1/paints",
-            &[("Prefer", "respond-async")],
-            b"slow five",
-        )
-        .await
-        .problem(503, "overloaded");
+    house.submit(b"slow five").await.problem(503, "overloaded");
     house.close().await;
 }
 

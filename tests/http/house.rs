@@ -271,6 +271,12 @@ impl House {
         answer.json()["id"].as_str().expect("an id").to_owned()
     }
 
+    /// Uploads something and does not wait for its job.
+    pub async fn submit(&self, words: &[u8]) -> Answer {
+        let headers = [("Prefer", "respond-async")];
+        self.ask("POST", "/v1/paints", &headers, words).await
+    }
+
     /// Blends paints and gives the blend's id.
     pub async fn blend(&self, paints: &[&str]) -> String {
         let body = json!({ "paints": paints }).to_string();

@@ -13,14 +13,7 @@ use crate::{folder, walk};
 async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
     let data = folder();
     let house = House::open(data.path()).await;
-    let answer = house
-        .ask(
-            "POST",
-            "/v1/paints",
-            &[("Prefer", "respond-async")],
-            b"slow one",
-        )
-        .await;
+    let answer = house.submit(b"slow one").await;
     assert_eq!(answer.status, 202, "{answer:?}");
     let address = answer.header("location").expect("a job").to_owned();
     assert_eq!(
@@ -28,14 +21,7 @@ async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
         address
     );
 
-    let other = house
-        .ask(
-            "POST",
-            "/v1/paints",
-            &[("Prefer", "respond-async")],
-            b"slow one",
-        )
-        .await;
+    let other = house.submit(b"slow one").await;
     assert_eq!(
         other.json()["id"],
         answer.json()["id"],
@@ -80,14 +66,7 @@ async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
     );
 
     let begun = Instant::now();
-    let answer = house
-        .ask(
-            "POST",
-            "/v1/paints",
-            &[("Prefer", "respond-async")],
-            b"slow two",
-        )
-        .await;
+    let answer = house.submit(b"slow two").await;
     let address = answer.header("location").expect("a job").to_owned();
     let cancelled = house.ask("DELETE", &address, &[], b"").await;
     assert_eq!(
@@ -98,14 +77,7 @@ async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
     assert!(begun.elapsed() < Duration::from_secs(3));
     assert_eq!(house.get(&address).await.json()["state"], "cancelled");
 
-    let failed = house
-        .ask(
-            "POST",
-            "/v1/paints",
-            &[("Prefer", "respond-async")],
-            b"not one",
-        )
-        .await;
+    let failed = house.submit(b"not one").await;
     let address = failed.header("location").expect("a job").to_owned();
     while !["failed"].contains(
         &house.get(&address).await.json()["state"]
@@ -125,8 +97,6 @@ async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
     house.close().await;
 }
 
-/// Files under a folder.
-
 #[tokio::test(flavor = "multi_thread")]
 async fn a_restart_changes_nothing_and_goes_on_with_what_was_under_way() {
     let data = folder();
@@ -140,14 +110,7 @@ async fn a_restart_changes_nothing_and_goes_on_with_what_was_under_way() {
         format!("/v1/blends/{blend}/preview.png?alpha=0.25&beta=0.75"),
     ];
     let before = join_all(addresses.iter().map(|path| house.get(path))).await;
-    let answer = house
-        .ask(
-            "POST",
-            "/v1/paints",
-            &[("Prefer", "respond-async")],
-            b"slow three",
-        )
-        .await;
+    let answer = house.submit(b"slow three").await;
     let job = answer.header("location").expect("a job").to_owned();
     tokio::time::sleep(Duration::from_millis(100)).await;
     assert_eq!(house.get(&job).await.json()["state"], "running");

@@ -12,6 +12,7 @@ mod house;
 mod interface;
 mod jobs;
 mod kill;
+mod nearest;
 mod paints;
 mod previews;
 mod problems;

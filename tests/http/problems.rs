@@ -203,6 +203,7 @@ async fn a_body_that_is_not_accepted_is_pointed_into() {
     }
     let good = json!({"paints": [a, b]}).to_string();
     let malformed = (400, "malformed-request", Some(""));
+    let large = vec![b' '; 100_000];
     let surprising = (400, "invalid-parameter", Some("/surprise"));
     for (path, media_type, body, refusal) in [
         ("/v1/blends", "application/json", &b"{"[..], malformed),
@@ -216,7 +217,7 @@ async fn a_body_that_is_not_accepted_is_pointed_into() {
         (
             "/v1/blends",
             "application/json",
-            &[b' '; 100_000],
+            &large,
             (413, "too-large", None),
         ),
         (

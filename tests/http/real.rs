@@ -118,6 +118,8 @@ async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again
         let refused = house.ask("POST", &address, &[], &file.body).await;
         refused.problem(400, "invalid-parameter");
     }
+    let fitted = house.count("carpaint_paints_fitted_total").await;
+    assert_eq!(fitted, 0.0, "a .paint is taken as it is");
     house.close().await;
 }
 
@@ -152,6 +154,7 @@ async fn a_table_is_fitted_with_progress_and_its_fit_can_be_called_off() {
     let bytes = table(0.2);
     let paint = upload(&house, &bytes).await;
     assert_eq!(paint["name"], "unnamed mpi-2005");
+    assert_eq!(house.count("carpaint_paints_fitted_total").await, 1.0);
     assert_eq!(paint["provenance"]["source"], "mpi-2005");
     let hash = blake3::hash(&bytes).to_hex().to_string();
     assert_eq!(paint["provenance"]["hashes"], json!([hash]));

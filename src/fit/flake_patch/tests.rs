@@ -3,7 +3,6 @@
 use super::*;
 use crate::fit::{ClusterSettings, FittedFlakes, simulate_flakes};
 use crate::paint::{ColorTable, Lobe};
-use std::ops::ControlFlow;
 
 fn silver() -> CarPaint {
     let lobe = |s: f64, alpha: f64, f0: f64| Lobe {
@@ -26,10 +25,7 @@ fn silver() -> CarPaint {
 }
 
 fn simulated(recipe: &FlakeRecipe) -> FittedFlakes {
-    simulate_flakes(&silver(), recipe, &ClusterSettings::default(), &|_, _| {
-        ControlFlow::Continue(())
-    })
-    .expect("in range")
+    simulate_flakes(&silver(), recipe, &ClusterSettings::default(), &|_, _| ()).expect("in range")
 }
 
 const SMALL: FlakeRecipe = FlakeRecipe {
@@ -114,9 +110,7 @@ fn a_recipe_out_of_range_is_refused_by_field() {
         tilt: f64::NAN,
         ..SMALL
     };
-    let error = simulate_flakes(&silver(), &recipe, &ClusterSettings::default(), &|_, _| {
-        ControlFlow::Continue(())
-    });
+    let error = simulate_flakes(&silver(), &recipe, &ClusterSettings::default(), &|_, _| ());
     assert!(error.expect_err("refused").to_string().contains("tilt"));
 }
 

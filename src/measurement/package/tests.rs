@@ -394,3 +394,23 @@ fn a_key_that_nobody_knows_is_told_but_not_refused() {
     assert_eq!(package.warnings.len(), 2);
     assert!(package.warnings[0].contains("\"flake\"") && package.warnings[1].contains("texel_mm"));
 }
+
+#[test]
+fn a_key_that_stands_twice_is_refused_by_name() {
+    let text = manifest().to_string();
+    for (once, twice, key) in [
+        (r#""version":1"#, r#""version":1,"version":1"#, "version"),
+        (r#""ior":1.5"#, r#""ior":1.5,"ior":1.4"#, "ior"),
+        (r#""alpha":0.3"#, r#""alpha":0.3,"\u0061lpha":0.3"#, "alpha"),
+    ] {
+        assert!(text.contains(once), "{once}");
+        let mut files = files(&manifest());
+        let written = text.replacen(once, twice, 1).into_bytes();
+        files.last_mut().expect("the manifest").1 = written;
+        let archive = zipped(&files, zip::CompressionMethod::Stored);
+        let refused = Package::from_bytes(archive, &Limits::default()).expect_err("twice");
+        let told = refused.to_string();
+        let want = format!("{MANIFEST} is damaged: the key {key:?} stands twice");
+        assert!(told.starts_with(&want), "{told}");
+    }
+}

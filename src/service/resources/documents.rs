@@ -101,12 +101,35 @@ pub struct PaintSummary {
     /// Where it is.
     #[schema(format = "uri-reference")]
     pub href: String,
+    /// Of paints near a color: CIEDE2000 between the two at the angle asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0)]
+    pub delta_e: Option<f64>,
+    /// Of paints near a color: L, a, b of the paint at the angle asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Vec<f64>>, min_items = 3, max_items = 3)]
+    pub lab: Option<[f64; 3]>,
+}
+
+impl From<PaintRecord> for PaintSummary {
+    fn from(record: PaintRecord) -> Self {
+        Self {
+            href: format!("/v1/paints/{}", record.id),
+            id: record.id,
+            name: record.name,
+            source: record.source,
+            visibility: record.visibility.into(),
+            hash: record.content.to_string(),
+            delta_e: None,
+            lab: None,
+        }
+    }
 }
 
 /// A page of paints.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct PaintList {
-    /// The paints, in the order they came.
+    /// The paints, in the order they came, or those nearest to a color first.
     pub paints: Vec<PaintSummary>,
     /// Cursor of the next page; null after the last.
     pub next: Option<String>,

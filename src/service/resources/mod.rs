@@ -12,6 +12,7 @@ pub mod estimates;
 pub mod home;
 pub mod jobs;
 mod making;
+mod nearest;
 pub mod operations;
 pub mod paints;
 pub mod previews;

@@ -6,13 +6,13 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use super::documents::{PaintDocument, PaintList, PaintSummary};
+use super::nearest::Color;
 use super::visibility::Visibility;
 use crate::service::app::App;
 use crate::service::http::{
     Address, Answer, Keep, Kind, NoQuery, PaintProblems, Problem, ProblemDocument, Problems, Query,
 };
 use crate::service::work::Format;
-use crate::store::PaintRecord;
 
 /// Longest page of a list.
 const LONGEST_PAGE: u32 = 200;
@@ -23,6 +23,13 @@ const LONGEST_PAGE: u32 = 200;
 pub struct ListQuery {
     /// Words that name or source contain, whatever the case.
     q: Option<String>,
+    /// L, a, b under D65 for the 2° observer: paints in the order of their CIEDE2000 to it, nearest first.
+    #[param(style = Form, explode = false, min_items = 3, max_items = 3, example = json!([60.5, -1.2, -3.0]))]
+    near: Option<Vec<f64>>,
+    /// Aspecular angle in degrees at which paints are compared with `near`, light at 45°: -15, 15, 25, 45, 75 or 110; 45
+    /// unless given.
+    #[param(example = 45)]
+    angle: Option<f64>,
     /// `private` lists paints that are not published, in place of those that are.
     visibility: Option<Visibility>,
     /// `next` of the page before.
@@ -32,7 +39,7 @@ pub struct ListQuery {
     limit: Option<u32>,
 }
 
-/// List paints.
+/// List paints, in the order they came or, with `near`, in that of their distance to a color.
 #[utoipa::path(
     get, operation_id = "list_paints", path = "/v1/paints", tag = "paints", params(ListQuery),
     responses(
@@ -44,31 +51,29 @@ pub async fn list(
     State(app): State<App>,
     Query(query): Query<ListQuery>,
 ) -> Result<Answer, Problem> {
-    let cursor = query
-        .cursor
-        .as_deref()
-        .map(|cursor| i64::from_str_radix(cursor, 36))
-        .transpose();
-    let cursor = cursor.map_err(|_| {
-        Problem::parameter("cursor", "The cursor was not made here.")
-            .accepting("`next` of the page before")
-    })?;
     let limit = query.limit.unwrap_or(50);
     if !(1..=LONGEST_PAGE).contains(&limit) {
         return Err(Problem::parameter("limit", format!("limit is {limit}.")).accepting("1 to 200"));
     }
-    let page = app
-        .catalogue
-        .paints(
-            query.q.as_deref(),
-            query.visibility.unwrap_or_default().into(),
-            cursor,
-            limit,
-        )
-        .await?;
-    let list = PaintList {
-        paints: page.paints.into_iter().map(summary).collect(),
-        next: page.next.map(base36),
+    let (q, cursor) = (query.q.as_deref(), query.cursor.as_deref());
+    let visibility = query.visibility.unwrap_or_default().into();
+    let list = if let Some(color) = Color::of_query(query.near.as_deref(), query.angle)? {
+        color
+            .page(&app, q, visibility, cursor, limit as usize)
+            .await?
+    } else {
+        let cursor = cursor
+            .map(|cursor| i64::from_str_radix(cursor, 36))
+            .transpose();
+        let cursor = cursor.map_err(|_| {
+            Problem::parameter("cursor", "The cursor was not made here.")
+                .accepting("`next` of the page before")
+        })?;
+        let page = app.catalogue.paints(q, visibility, cursor, limit).await?;
+        PaintList {
+            paints: page.paints.into_iter().map(PaintSummary::from).collect(),
+            next: page.next.map(base36),
+        }
     };
     Ok(Answer::json(&list, Keep::Revalidated))
 }
@@ -81,17 +86,6 @@ fn base36(mut number: i64) -> String {
         number /= 36;
     }
     digits.iter().rev().collect()
-}
-
-fn summary(record: PaintRecord) -> PaintSummary {
-    PaintSummary {
-        href: format!("/v1/paints/{}", record.id),
-        id: record.id,
-        name: record.name,
-        source: record.source,
-        visibility: record.visibility.into(),
-        hash: record.content.to_string(),
-    }
 }
 
 /// What is known about a paint.

@@ -15,6 +15,7 @@ use super::works::{IngestOrder, WorkError};
 use crate::service::app::App;
 use crate::service::http::{Kind, Problem};
 use crate::store::{Hash, JobRecord, StoreError};
+use crate::workshop::is_paint_file;
 
 /// What a job needs to make a paint.
 #[derive(Debug, Serialize, Deserialize)]
@@ -105,15 +106,20 @@ async fn once(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Fault> {
     let works = Arc::clone(&app.works);
     let fitted = under_way.compute(app, "fitting", move |progress| {
         let fitted = works.ingest(local.path(), &order, progress);
+        let is_fit = is_paint_file(local.path()).is_ok_and(|as_it_is| !as_it_is);
         // The caller knows the upload, not the file it was kept in.
         let folder = local.path().display().to_string();
-        fitted.map_err(|error| error.without(&folder))
+        fitted
+            .map(|file| (file, is_fit))
+            .map_err(|error| error.without(&folder))
     });
     let Ok(fitted) = fitted.await.map_err(Fault::Lasting)? else {
         return Ok(Err(CalledOff));
     };
-    let file = fitted.map_err(|error| Fault::Lasting(WorkError::of_upload(error)))?;
-    app.metrics.paints_fitted.increment(1);
+    let (file, is_fit) = fitted.map_err(|error| Fault::Lasting(WorkError::of_upload(error)))?;
+    if is_fit {
+        app.metrics.paints_fitted.increment(1);
+    }
     under_way.stage("storing");
     Ok(app.keep_paint(id, file, Some(upload)).await.map(Ok)?)
 }

@@ -8,6 +8,7 @@
 //! Left to others: what requests look like (`resources`), how paints are made (`crate::workshop`).
 
 mod blending;
+pub mod colors;
 pub mod drawing;
 mod ingesting;
 mod job_document;

@@ -4,8 +4,8 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use super::{SqliteCatalogue, hash};
-use crate::store::blobs::Task;
-use crate::store::{PaintPage, PaintRecord, Paints, StoreError, Visibility};
+use crate::store::blobs::{Hash, Task};
+use crate::store::{NotedPaint, PaintPage, PaintRecord, Paints, StoreError, Visibility};
 
 fn record(row: &SqliteRow) -> Result<PaintRecord, StoreError> {
     let measurement: Option<String> = row.try_get("measurement")?;
@@ -21,6 +21,21 @@ fn record(row: &SqliteRow) -> Result<PaintRecord, StoreError> {
             what: "paint",
             detail: format!("its visibility is {visibility:?}"),
         })?,
+    })
+}
+
+fn noted(row: &SqliteRow) -> Result<NotedPaint, StoreError> {
+    let numbers: Option<String> = row.try_get("numbers")?;
+    let read = |text: String| {
+        serde_json::from_str(&text).map_err(|error| StoreError::Corrupt {
+            what: "note",
+            detail: error.to_string(),
+        })
+    };
+    Ok(NotedPaint {
+        id: row.try_get("id")?,
+        paint: hash(row.try_get("paint")?, "paint")?,
+        numbers: numbers.map(read).transpose()?,
     })
 }
 
@@ -97,13 +112,60 @@ impl Paints for SqliteCatalogue {
         })
     }
 
+    fn note<'a>(&'a self, paint: Hash, kind: &'a str, numbers: &'a [f64]) -> Task<'a, ()> {
+        Box::pin(async move {
+            sqlx::query(
+                "INSERT OR REPLACE INTO notes (paint, kind, numbers)
+                 SELECT ?1, ?2, ?3 WHERE EXISTS (SELECT 1 FROM paints WHERE paint = ?1)",
+            )
+            .bind(paint.to_string())
+            .bind(kind)
+            .bind(serde_json::json!(numbers).to_string())
+            .execute(&self.write)
+            .await?;
+            Ok(())
+        })
+    }
+
+    fn noted<'a>(
+        &'a self,
+        q: Option<&'a str>,
+        visibility: Visibility,
+        kind: &'a str,
+    ) -> Task<'a, Vec<NotedPaint>> {
+        Box::pin(async move {
+            let rows = sqlx::query(
+                "SELECT id, paints.paint, numbers
+                 FROM paints LEFT JOIN notes ON notes.paint = paints.paint AND notes.kind = ?1
+                 WHERE visibility = ?2 AND (?3 = '' OR instr(words, ?3) > 0) ORDER BY seq",
+            )
+            .bind(kind)
+            .bind(visibility.word())
+            .bind(q.unwrap_or("").to_lowercase())
+            .fetch_all(&self.read)
+            .await?;
+            rows.iter().map(noted).collect()
+        })
+    }
+
     fn remove_paint<'a>(&'a self, id: &'a str) -> Task<'a, Option<PaintRecord>> {
         Box::pin(async move {
+            let mut transaction = self.write.begin().await?;
             let row = sqlx::query("DELETE FROM paints WHERE id = ? RETURNING *")
                 .bind(id)
-                .fetch_optional(&self.write)
+                .fetch_optional(&mut *transaction)
                 .await?;
-            row.as_ref().map(record).transpose()
+            let removed = row.as_ref().map(record).transpose()?;
+            if let Some(removed) = &removed {
+                sqlx::query(
+                    "DELETE FROM notes WHERE paint = ?1 AND NOT EXISTS (SELECT 1 FROM paints WHERE paint = ?1)",
+                )
+                .bind(removed.paint.to_string())
+                .execute(&mut *transaction)
+                .await?;
+            }
+            transaction.commit().await?;
+            Ok(removed)
         })
     }
 }

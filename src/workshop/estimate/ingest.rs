@@ -232,11 +232,7 @@ fn fitted(
     let go = |wanted: usize| -> Result<(f64, FittedFlakes), WorkshopError> {
         let steps = angles.map(|n| every * step_for(n, wanted));
         let thinned = Thinned::by_steps(pictures, steps);
-        let (seconds, fitted) = timed(|| {
-            fit_flakes(&thinned, &settings, &|_, _| {
-                std::ops::ControlFlow::Continue(())
-            })
-        });
+        let (seconds, fitted) = timed(|| fit_flakes(&thinned, &settings, &|_, _| ()));
         Ok((seconds, fitted.map_err(|e| WorkshopError::input(name, e))?))
     };
     // The first go warms up.

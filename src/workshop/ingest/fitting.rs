@@ -1,7 +1,5 @@
 //! From an opened measurement to a paint: base, flakes, what is known about how well.
 
-use std::ops::ControlFlow;
-
 use super::IngestOptions;
 use super::measurement::BareMeasurement;
 use crate::accuracy::clustering_error;
@@ -107,7 +105,6 @@ pub(super) fn ingest_package(
         let tell = |done: usize, of: usize| {
             #[allow(clippy::cast_precision_loss)] // a progress bar
             progress(based + (1.0 - based) * done as f32 / of as f32);
-            ControlFlow::Continue(())
         };
         let fitted =
             fit_flakes(pictures, &options.profile.flakes, &tell).map_err(|e| e.to_string())?;

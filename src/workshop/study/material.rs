@@ -1,6 +1,5 @@
 //! The paints of a study: their pictures, opened once, and their fits by cluster settings, kept.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::WorkshopError;
@@ -99,7 +98,7 @@ impl Material {
 impl Pictures {
     /// Fits the flakes, as an ingest does.
     pub fn fit(&self, settings: &ClusterSettings) -> Result<PaintFile, WorkshopError> {
-        let fitted = fit_flakes(&*self.flakes, settings, &|_, _| ControlFlow::Continue(()))
+        let fitted = fit_flakes(&*self.flakes, settings, &|_, _| ())
             .map_err(|e| WorkshopError::input(&self.name, e))?;
         let paint = CarPaint {
             flakes: Some(fitted.flakes),
