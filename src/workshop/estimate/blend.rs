@@ -1,10 +1,14 @@
 //! Estimates of a blend.
 
 use super::ingest::{Sampled, of_paint, sample};
-use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, timed, write_seconds};
+use super::{
+    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, shortest, timed,
+    write_seconds,
+};
 use crate::accuracy::{Profile, blend_error};
 use crate::blend::Blend;
 use crate::paint::PaintFile;
+use crate::transport::{Cost, Method};
 use crate::workshop::{IngestOptions, WorkshopError, blend_paints};
 
 /// What blending paints, measurements and samples will take, opening and ingesting them included.
@@ -16,9 +20,10 @@ pub fn estimate_blend(
     names: &[String],
     options: &IngestOptions,
 ) -> Result<Estimate, WorkshopError> {
+    let sizes = sizes(names.len(), &options.profile);
     let sampled = names
         .iter()
-        .map(|name| sample(name, options))
+        .map(|name| sample(name, options, sizes))
         .collect::<Result<Vec<_>, _>>()?;
     of_samples(&sampled, &options.profile, true)
 }
@@ -32,12 +37,27 @@ pub fn estimate_blend_of(
     paints: &[&PaintFile],
     profile: &Profile,
 ) -> Result<Estimate, WorkshopError> {
+    let sizes = sizes(paints.len(), profile);
     let sampled: Vec<Sampled> = paints
         .iter()
-        .map(|&paint| of_paint(paint.clone(), profile, 0.0))
+        .map(|&paint| of_paint(paint.clone(), profile, sizes, 0.0))
         .collect();
     of_samples(&sampled, profile, false)
 }
+
+/// Angles of the samples. Where a blend is compared with what each pair could have alone, or with exact transport, that
+/// is done on some slices of a large grid and on all of a small one: samples have to be beyond that.
+fn sizes(paints: usize, profile: &Profile) -> Sizes {
+    let alike = profile.blend.method == Method::Exact && profile.blend.cost == Cost::Distance;
+    if paints == 2 && alike {
+        FEW_ANGLES
+    } else {
+        MANY_ANGLES
+    }
+}
+
+/// Angles of samples of more slices than are compared.
+const MANY_ANGLES: Sizes = [9, 14];
 
 /// What the first go takes longer than the shortest of three.
 const COLD: f64 = 1.2;

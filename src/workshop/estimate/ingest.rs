@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{
-    Estimate, EstimatedError, SAMPLED_ANGLES, Stage, extrapolated, left_at, shortest, step_for,
+    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, left_at, shortest, step_for,
     timed, write_seconds,
 };
 use crate::accuracy::{
@@ -38,7 +38,7 @@ pub(super) struct Sampled {
 ///
 /// [`WorkshopError`] for what cannot be opened, or is no measurement.
 pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, WorkshopError> {
-    let sampled = sample(name, options)?;
+    let sampled = sample(name, options, FEW_ANGLES)?;
     let whole = sampled.angles.map_or(1.0, |[h, d]| (h * d) as f64);
     let size = |paint: &PaintFile| {
         let flakes = paint.paint.flakes.as_ref();
@@ -78,13 +78,17 @@ pub fn sample_to_estimate(
         };
         return Ok((vec![read], thing?));
     }
-    let Sampled { paints, stages, .. } = sample(name, options)?;
+    let Sampled { paints, stages, .. } = sample(name, options, FEW_ANGLES)?;
     let [_, paint] = paints;
     Ok((stages, Thing::Paint(Box::new(paint))))
 }
 
 /// Opens what a name means, of a measurement or of a sample only some angles.
-pub(super) fn sample(name: &str, options: &IngestOptions) -> Result<Sampled, WorkshopError> {
+pub(super) fn sample(
+    name: &str,
+    options: &IngestOptions,
+    sizes: Sizes,
+) -> Result<Sampled, WorkshopError> {
     match find(name)? {
         Source::Sample(sample) => {
             let paint = sample.base();
@@ -96,27 +100,33 @@ pub(super) fn sample(name: &str, options: &IngestOptions) -> Result<Sampled, Wor
             let Some(patch) = patch? else {
                 return Ok(Sampled::solid(finished(sample.name, paint, None), stages));
             };
-            let (paints, angles) =
-                fitted(&patch, &paint, sample.name, &options.profile, &mut stages)?;
+            let (paints, angles) = fitted(
+                &patch,
+                &paint,
+                sample.name,
+                &options.profile,
+                sizes,
+                &mut stages,
+            )?;
             Ok(Sampled {
                 paints,
                 angles: Some(angles),
                 stages,
             })
         }
-        Source::Path(path) if is_measurement(&path)? => of_measurement(&path, name, options),
+        Source::Path(path) if is_measurement(&path)? => of_measurement(&path, name, options, sizes),
         Source::Path(_) => {
             let (seconds, thing) = timed(|| open(name, options, &|_| ()));
             let Thing::Paint(paint) = thing? else {
                 return Err(WorkshopError::input(name, "this is a blend, not a paint"));
             };
-            Ok(of_paint(*paint, &options.profile, seconds))
+            Ok(of_paint(*paint, &options.profile, sizes, seconds))
         }
     }
 }
 
 /// Samples of a paint that is there.
-pub(super) fn of_paint(paint: PaintFile, profile: &Profile, seconds: f64) -> Sampled {
+pub(super) fn of_paint(paint: PaintFile, profile: &Profile, sizes: Sizes, seconds: f64) -> Sampled {
     let stages = vec![Stage {
         stage: "read",
         seconds,
@@ -127,7 +137,7 @@ pub(super) fn of_paint(paint: PaintFile, profile: &Profile, seconds: f64) -> Sam
     let had = paint.clustering.as_ref().map_or(1, |c| c.angle_step).max(1);
     let step = (profile.flakes.angle_step / had).max(1);
     let angles = [flakes.theta_h.len(), flakes.theta_d.len()].map(|n| left_at(n, step));
-    let paints = SAMPLED_ANGLES.map(|wanted| {
+    let paints = sizes.map(|wanted| {
         let [rows, columns] = [&flakes.theta_h, &flakes.theta_d].map(|grid| {
             let left = grid.every(step);
             let every = step_for(left.len(), wanted);
@@ -177,6 +187,7 @@ fn of_measurement(
     path: &Path,
     name: &str,
     options: &IngestOptions,
+    sizes: Sizes,
 ) -> Result<Sampled, WorkshopError> {
     let (seconds, measurement) = timed(|| open_measurement(path, options));
     let mut stages = vec![Stage {
@@ -207,7 +218,7 @@ fn of_measurement(
     let Some(pictures) = &package.flakes else {
         return Ok(Sampled::solid(finished(name, paint, None), stages));
     };
-    let (paints, angles) = fitted(pictures, &paint, name, &options.profile, &mut stages)?;
+    let (paints, angles) = fitted(pictures, &paint, name, &options.profile, sizes, &mut stages)?;
     Ok(Sampled {
         paints,
         angles: Some(angles),
@@ -221,6 +232,7 @@ fn fitted(
     base: &CarPaint,
     name: &str,
     profile: &Profile,
+    sizes: Sizes,
     stages: &mut Vec<Stage>,
 ) -> Result<([PaintFile; 2], [usize; 2]), WorkshopError> {
     let settings = ClusterSettings {
@@ -236,8 +248,8 @@ fn fitted(
         Ok((seconds, fitted.map_err(|e| WorkshopError::input(name, e))?))
     };
     // The first go warms up.
-    go(SAMPLED_ANGLES[0])?;
-    let (small, large) = (go(SAMPLED_ANGLES[0])?, go(SAMPLED_ANGLES[1])?);
+    go(sizes[0])?;
+    let (small, large) = (go(sizes[0])?, go(sizes[1])?);
     let size = |fitted: &FittedFlakes| fitted.flakes.slices() as f64;
     let whole = (angles[0] * angles[1]) as f64;
     stages.push(Stage {

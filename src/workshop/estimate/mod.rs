@@ -102,7 +102,10 @@ impl Estimate {
 }
 
 /// Angles on an axis of the smaller and of the larger sample.
-const SAMPLED_ANGLES: [usize; 2] = [3, 6];
+type Sizes = [usize; 2];
+
+/// Angles of samples whose every slice is treated alike.
+const FEW_ANGLES: Sizes = [3, 6];
 
 /// Step at which an axis of so many angles is left with about `wanted`.
 fn step_for(angles: usize, wanted: usize) -> usize {
