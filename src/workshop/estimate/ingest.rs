@@ -1,5 +1,6 @@
 //! Estimates of an ingest, and samples of paints that are still to be ingested.
 
+use std::io::Read as _;
 use std::path::Path;
 
 use super::{
@@ -12,7 +13,7 @@ use crate::accuracy::{
 use crate::fit::{ClusterSettings, FittedFlakes, Thinned, fit_flakes};
 use crate::measurement::{FlakePictures, PackageBase};
 use crate::paint::{
-    CarPaint, Chi, Clustering, ColorTable, Lobe, PaintFile, Provenance, Reflectance,
+    CarPaint, Chi, Clustering, ColorTable, Lobe, PaintFile, Provenance, Reflectance, certify,
     instrument_pairs,
 };
 use crate::workshop::ingest::finish;
@@ -195,7 +196,10 @@ fn of_measurement(
         seconds,
     }];
     let package = match measurement? {
-        Measurement::Package(package) => package,
+        Measurement::Package(package) => {
+            stages.push(hash_stage(path));
+            package
+        }
         Measurement::Brdf(..) => {
             stages.push(fit_stage());
             return Ok(Sampled::solid(finished(name, stand_in(), None), stages));
@@ -276,6 +280,12 @@ fn fitted(
         stage: "compare",
         seconds,
     });
+    // It hardly depends on the number of slices.
+    let (seconds, _) = timed(|| certify(&paints[1].paint));
+    stages.push(Stage {
+        stage: "certificate",
+        seconds,
+    });
     let error = predicted_clustering_error(pictures, base, &profile.flakes);
     for paint in &mut paints {
         if let Some(clustering) = &mut paint.clustering {
@@ -313,6 +323,23 @@ fn finished(name: &str, paint: CarPaint, clustering: Option<Clustering>) -> Pain
         clustering,
         nothing,
     )
+}
+
+/// What hashing a package takes, by the first part of it.
+fn hash_stage(path: &Path) -> Stage {
+    const PART: u64 = 4 << 20;
+    let length = std::fs::metadata(path).map_or(0, |about| about.len());
+    let (seconds, hashed) = timed(|| -> std::io::Result<u64> {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update_reader(std::fs::File::open(path)?.take(PART))?;
+        Ok(hasher.count())
+    });
+    // Of a folder's files none was read.
+    let part = hashed.unwrap_or(0).max(1) as f64;
+    Stage {
+        stage: "hash",
+        seconds: seconds * (length as f64 / part).max(1.0),
+    }
 }
 
 /// What fitting a reflectance table takes.
