@@ -31,8 +31,9 @@ pub use resources::docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use work::{
-    Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
-    Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works, Workshop,
+    Asked, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Picked, Picture,
+    PictureFormat, Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
+    Workshop,
 };
 
 use std::path::PathBuf;

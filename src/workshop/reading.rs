@@ -2,7 +2,7 @@
 
 use super::error::WorkshopError;
 use crate::color::{Lab, ciede2000};
-use crate::export::{self, Readings};
+use crate::export::{self, Gloss, Readings};
 use crate::paint::{ASPECULAR_DEG, PaintFile};
 
 /// Most angles that are read at once.
@@ -26,6 +26,12 @@ pub fn readings(
         return Err(WorkshopError::usage("angles", message));
     }
     export::readings(&paint.paint, angles).map_err(|error| WorkshopError::usage("angles", error))
+}
+
+/// What a glossmeter reads of a paint.
+#[must_use]
+pub fn gloss(paint: &PaintFile) -> Gloss {
+    export::gloss(&paint.paint)
 }
 
 /// CIEDE2000 between two readings, L, a, b each.

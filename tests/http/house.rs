@@ -9,8 +9,9 @@ use carpaint::accuracy::Profile;
 use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
-    App, Asked, Estimate, Fault, Format, IngestOrder, Picked, Picture, PictureFormat, Progress,
-    Readings, ServiceConfig, Target, Thing, View, WorkError, Works, Workshop, open, serve,
+    App, Asked, Estimate, Fault, Format, Gloss, IngestOrder, Picked, Picture, PictureFormat,
+    Progress, Readings, ServiceConfig, Target, Thing, View, WorkError, Works, Workshop, open,
+    serve,
 };
 use carpaint::workshop::EstimatedError;
 use serde_json::{Value, json};
@@ -153,6 +154,10 @@ impl Works for Pretend {
 
     fn readings(&self, paint: &Thing, angles: Option<&[f64]>) -> Result<Readings, WorkError> {
         carpaint::service::Workshop::new(carpaint::paint::Limits::default()).readings(paint, angles)
+    }
+
+    fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkError> {
+        carpaint::service::Workshop::new(carpaint::paint::Limits::default()).gloss(paint)
     }
 
     fn estimate(&self, _: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError> {

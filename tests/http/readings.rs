@@ -12,6 +12,10 @@ async fn a_paint_is_read_at_any_angle_above_it() {
     assert_eq!(six.status, 200, "{six:?}");
     let angles: Vec<f64> = rows(&six.json()).map(|row| row[0]).collect();
     assert_eq!(angles, [-15.0, 15.0, 25.0, 45.0, 75.0, 110.0]);
+    for angle in ["20", "60", "85"] {
+        let gloss = six.json()["gloss"][angle].as_f64().expect("a number");
+        assert!((0.0..100.0).contains(&gloss), "{angle}: {gloss}");
+    }
     let two = house.get(&format!("{address}?angles=45,-15")).await;
     let table = house.get(&format!("{address}.csv?angles=45,-15")).await;
     assert_eq!(table.header("content-type"), Some("text/csv"));

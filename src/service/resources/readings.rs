@@ -4,12 +4,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use axum::extract::State;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use utoipa::IntoParams;
 
 use crate::service::app::App;
 use crate::service::http::{Address, Answer, Keep, PaintProblems, Problem, ProblemDocument, Query};
-use crate::service::work::{Readings, WorkError};
+use crate::service::work::{Gloss, Readings, Thing, WorkError, Works};
 
 /// Where an instrument looks from.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -21,9 +21,18 @@ pub struct ReadingQuery {
     angles: Option<Vec<f64>>,
 }
 
-/// Readings of a paint, as the `multi_angle` part of a measured-paint package.
+/// What instruments say of a paint.
+#[derive(Serialize)]
+struct ReadingDocument {
+    #[serde(flatten)]
+    readings: Readings,
+    gloss: Gloss,
+}
+
+/// Readings of a paint, as the `multi_angle` part of a measured-paint package, and its gloss.
 ///
 /// L, a, b of the reflectance factor under D65 for the 2° observer, light at 45°, the coat's mirror image left out.
+/// `gloss` is what a glossmeter reads at 20°, 60° and 85°, in gloss units (ASTM D523).
 #[utoipa::path(
     get, operation_id = "paint_readings", path = "/v1/paints/{id}/readings", tag = "paints",
     params(("id" = String, Path, description = "Paint"), ReadingQuery),
@@ -38,8 +47,13 @@ pub async fn show(
     Address(id): Address<String>,
     Query(query): Query<ReadingQuery>,
 ) -> Result<Answer, Problem> {
-    let answer = |readings: &Readings| Answer::json(readings, Keep::Revalidated);
-    read(&app, &id, query, answer).await
+    let instruments = move |works: &dyn Works, paint: &Thing| {
+        let readings = works.readings(paint, query.angles.as_deref())?;
+        let gloss = works.gloss(paint)?;
+        Ok(ReadingDocument { readings, gloss })
+    };
+    let answer = |document: ReadingDocument| Answer::json(&document, Keep::Revalidated);
+    read(&app, &id, instruments, answer).await
 }
 
 /// Readings of a paint as comma-separated values, a line of column names first.
@@ -57,23 +71,26 @@ pub async fn table(
     Address(id): Address<String>,
     Query(query): Query<ReadingQuery>,
 ) -> Result<Answer, Problem> {
-    let answer = |readings: &Readings| {
+    let instrument =
+        move |works: &dyn Works, paint: &Thing| works.readings(paint, query.angles.as_deref());
+    let answer = |readings: Readings| {
         let table = Answer::bytes("text/csv", readings.to_csv(), Keep::Revalidated);
         table.saved_as(&format!("{id}.readings.csv"))
     };
-    read(&app, &id, query, answer).await
+    read(&app, &id, instrument, answer).await
 }
 
-async fn read(
+/// Holds instruments against a paint and answers with what they say.
+async fn read<T: Send + 'static>(
     app: &App,
     id: &str,
-    query: ReadingQuery,
-    answer: impl FnOnce(&Readings) -> Answer,
+    instruments: impl FnOnce(&dyn Works, &Thing) -> Result<T, WorkError> + Send + 'static,
+    answer: impl FnOnce(T) -> Answer,
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let paint = app.paint(id).await?;
     let works = Arc::clone(&app.works);
-    let read = move || works.readings(&paint.thing, query.angles.as_deref());
-    let readings = app.bench.run(read).await?.map_err(WorkError::of_query)?;
-    Ok(answer(&readings).stage("reading", begun.elapsed()))
+    let read = app.bench.run(move || instruments(&*works, &paint.thing));
+    let told = read.await?.map_err(WorkError::of_query)?;
+    Ok(answer(told).stage("reading", begun.elapsed()))
 }

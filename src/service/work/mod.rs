@@ -26,7 +26,7 @@ pub use runner::Jobs;
 pub use watchers::Watchers;
 pub use workbench::{Workbench, call_off};
 pub use works::{
-    Asked, Estimate, Fault, Format, IngestOrder, Layout, Light, Picked, Picture, PictureFormat,
-    Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
+    Asked, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Picked, Picture,
+    PictureFormat, Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
 };
 pub use workshop::Workshop;

@@ -15,7 +15,7 @@ pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
 pub use crate::measurement::{Layout, ThetaHSpacing};
 pub use crate::workshop::{
-    Estimate, Format, Light, Picked, PictureFormat, Readings, Shape, Target, Thing,
+    Estimate, Format, Gloss, Light, Picked, PictureFormat, Readings, Shape, Target, Thing,
 };
 
 /// How an upload becomes a paint.
@@ -189,6 +189,13 @@ pub trait Works: Debug + Send + Sync {
     /// [`WorkError`] for angles that no instrument reads at.
     fn readings(&self, paint: &Thing, aspecular_deg: Option<&[f64]>)
     -> Result<Readings, WorkError>;
+
+    /// What a glossmeter reads of a paint.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`] for a blend, which has no gloss of its own.
+    fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkError>;
 
     /// What some work will take with a profile.
     ///

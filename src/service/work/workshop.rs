@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Asked, Estimate, Fault, Format, IngestOrder, Picked, Picture, PictureFormat, Progress,
+    Asked, Estimate, Fault, Format, Gloss, IngestOrder, Picked, Picture, PictureFormat, Progress,
     Readings, Target, Thing, View, WorkError, Works,
 };
 use crate::accuracy::Profile;
@@ -94,6 +94,14 @@ impl Workshop {
     }
 }
 
+/// What an instrument can be held against.
+fn paint_of(thing: &Thing) -> Result<&PaintFile, WorkError> {
+    match thing {
+        Thing::Paint(paint) => Ok(paint),
+        Thing::Blend(_) => Err(WorkshopError::internal("a blend is not read").into()),
+    }
+}
+
 fn options_of(view: &View) -> PreviewOptions {
     PreviewOptions {
         scene: view.scene,
@@ -169,10 +177,11 @@ impl Works for Workshop {
         paint: &Thing,
         aspecular_deg: Option<&[f64]>,
     ) -> Result<Readings, WorkError> {
-        match paint {
-            Thing::Paint(paint) => Ok(workshop::readings(paint, aspecular_deg)?),
-            Thing::Blend(_) => Err(WorkshopError::internal("a blend is not read").into()),
-        }
+        Ok(workshop::readings(paint_of(paint)?, aspecular_deg)?)
+    }
+
+    fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkError> {
+        Ok(workshop::gloss(paint_of(paint)?))
     }
 
     fn estimate(&self, asked: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError> {
