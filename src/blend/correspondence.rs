@@ -282,7 +282,14 @@ fn blend_slice(
         cost: 0.0,
         gap: 0.0,
     };
-    for &place in &order[1..] {
+    for (joined, &place) in order.iter().enumerate().skip(1) {
+        // The same paint once more moves nothing: whatever share it has, its flakes go where they went before.
+        let same = |&before: &usize| std::ptr::eq(paints[before], paints[place]);
+        if let Some(before) = order[..joined].iter().position(same) {
+            let boxes = slice.boxes[before].clone();
+            slice.boxes.push(boxes);
+            continue;
+        }
         clusters_of(place, &mut bench.clusters);
         let source =
             (0..slice.probability.len()).map(|k| (slice.even_center(k), slice.probability[k]));

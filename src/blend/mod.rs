@@ -192,7 +192,12 @@ impl Blend {
         for (place, &k) in canonical.iter().enumerate() {
             asked[k] = place;
         }
-        let ordered: Vec<&CarPaint> = canonical.iter().map(|&k| ingredients[k].paint).collect();
+        // Paints of equal content are one and the same, however often they are given.
+        let first = |k: usize| canonical.iter().find(|&&j| hashes[j] == hashes[k]);
+        let ordered: Vec<&CarPaint> = canonical
+            .iter()
+            .map(|&k| ingredients[first(k).map_or(k, |&j| j)].paint)
+            .collect();
         let (flakes, report) = correspond(&ordered, settings, angles, progress)?;
         let (chi_h, chi_d) = base::common_table_grid(&ordered)?;
         let paints = canonical

@@ -120,23 +120,99 @@ fn a_paint_with_itself_is_that_paint_at_every_weight() {
             &format!("at {t}"),
         );
     }
-    // 0.7 + 0.3 is 1, yet 0.7 x + 0.3 x is x only to an ulp: three roundings each, in f32 for the boxes; and two powers
-    // of a roughness, whose logarithm is below 3, give it back to as many.
-    let third = realise(&blend, &[0.7, 0.3]).paint;
-    for (x, y) in third.diffuse.iter().zip(a.diffuse) {
-        assert!((x - y).abs() <= 3.0 * f64::EPSILON * y);
-    }
-    for (x, y) in third.lobes.iter().zip(&a.lobes) {
+    // Weights that sum to 1, yet Σ w x is x only to a rounding of each weight, product and sum.
+    for weights in [[0.7, 0.3], [-3.0, 4.0], [4.5, -3.5], [1e6, 1.0 - 1e6]] {
+        let realised = realise(&blend, &weights);
         assert!(
-            (x.alpha / y.alpha - 1.0).abs() <= 8.0 * f64::EPSILON,
-            "{x:?} {y:?}"
+            realised.clamps.is_empty(),
+            "{weights:?}: {:?}",
+            realised.clamps
         );
+        assert_combined(&realised.paint, &a, &weights);
     }
-    let (got, want) = (third.flakes.expect("has"), a.flakes.expect("has"));
-    for k in 0..want.slices() {
-        for (x, y) in got.slice_at(k).mean().iter().zip(want.slice_at(k).mean()) {
-            // An ulp of f32 at L = 70 is 8e-6, and light moves by 3 f²/116 of that.
-            assert!((x - y).abs() <= 1e-6, "{x} {y}");
+}
+
+/// A paint mixed from nothing but itself: what is summed in 64 bits is off by 4 EPS of the sum of sizes, `Σ|w|` times the
+/// number; a geometric mean of equal numbers is that number. Boxes are summed in 32 bits up to weights of 4, with 2^-22 in
+/// place of 4 EPS, and in 64 beyond, where only their last rounding is one of 32.
+fn assert_combined(got: &CarPaint, want: &CarPaint, weights: &[f64]) {
+    let size: f64 = weights.iter().map(|w| w.abs()).sum();
+    let what = format!("{weights:?}");
+    let close = |x: f64, y: f64, field: &str| {
+        assert!(
+            (x - y).abs() <= size * 4.0 * f64::EPSILON * y.abs(),
+            "{what}, {field}: {x:?} instead of {y:?}"
+        );
+    };
+    let (c, d) = (got.coat.expect("coated"), want.coat.expect("coated"));
+    close(c.ior, d.ior, "index");
+    close(c.roughness, d.roughness, "coat's roughness");
+    assert_eq!(c.thickness_um, d.thickness_um);
+    for k in 0..3 {
+        close(got.diffuse[k], want.diffuse[k], "diffuse");
+    }
+    let mut lobes = want.lobes.clone();
+    lobes.sort_by(|x, y| x.alpha.total_cmp(&y.alpha));
+    assert_eq!(got.lobes.len(), lobes.len());
+    for (x, y) in got.lobes.iter().zip(&lobes) {
+        assert_eq!(x.alpha, y.alpha, "{what}");
+        close(x.f0, y.f0, "F0");
+        for k in 0..3 {
+            close(x.weight[k], y.weight[k], "lobe's weight");
+        }
+    }
+    let (x, y) = (&got.color_table, &want.color_table);
+    assert_eq!((x.theta_h(), x.theta_d()), (y.theta_h(), y.theta_d()));
+    let colors = x
+        .nodes()
+        .iter()
+        .chain([x.overall()].iter())
+        .copied()
+        .collect::<Vec<_>>();
+    let originals = y
+        .nodes()
+        .iter()
+        .chain([y.overall()].iter())
+        .copied()
+        .collect::<Vec<_>>();
+    for (x, y) in colors.iter().zip(&originals) {
+        for k in 0..3 {
+            close(x.to_array()[k], y.to_array()[k], "color");
+        }
+    }
+    let (x, y) = (
+        got.flakes.as_ref().expect("has"),
+        want.flakes.as_ref().expect("has"),
+    );
+    assert_eq!(x.texture, y.texture, "{what}");
+    assert_eq!(
+        (&x.theta_h, &x.theta_d, &x.offsets),
+        (&y.theta_h, &y.theta_d, &y.offsets)
+    );
+    let rounding = if weights.iter().all(|w| w.abs() <= 4.0) {
+        size * 2.0_f64.powi(-22)
+    } else {
+        2.0_f64.powi(-24) + size * 4.0 * f64::EPSILON
+    };
+    // Clusters of a slice may come in another order: boxes are compared by their lower corners' order.
+    for slice in 0..y.slices() {
+        let sorted = |f: &Flakes| {
+            let slice = f.slice_at(slice);
+            let mut list: Vec<_> = (0..slice.probability.len())
+                .map(|k| (slice.lower[k], slice.upper[k], slice.probability[k]))
+                .collect();
+            list.sort_by(|x, y| x.0[0].total_cmp(&y.0[0]));
+            list
+        };
+        for (x, y) in sorted(x).iter().zip(&sorted(y)) {
+            assert!((x.2 - y.2).abs() <= 1e-12, "{what}: {x:?} {y:?}");
+            for k in 0..3 {
+                let corner = f64::from(y.0[k].abs().max(y.1[k].abs()));
+                let off = f64::from(x.0[k] - y.0[k])
+                    .abs()
+                    .max(f64::from(x.1[k] - y.1[k]).abs());
+                assert!(off <= rounding * corner, "{what}: {x:?} instead of {y:?}");
+            }
         }
     }
 }
@@ -167,6 +243,53 @@ fn five_paints_in_any_order_are_one_blend() {
         let shuffled = order.map(|k| &paints[k]);
         let got = realise(&blend(&shuffled), &order.map(|k| weights[k]));
         assert_eq!(got.paint, want, "{order:?}");
+    }
+}
+
+#[test]
+fn two_paints_given_twice_are_one_blend_in_any_order() {
+    let (a, b) = (metallic(13, H, D), metallic(14, H, &[0.0, 10.0]));
+    let given = [&a, &b, &a, &b];
+    for weights in [[0.3_f64, 0.1, 0.25, 0.35], [1.5, -0.75, 0.5, -0.25]] {
+        let size: f64 = weights.iter().map(|w| w.abs()).sum();
+        let want = realise(&blend(&given), &weights).paint;
+        let mut orders = 0;
+        for code in 0..256_usize {
+            let order = [code & 3, code >> 2 & 3, code >> 4 & 3, code >> 6];
+            if (0..4).any(|k| !order.contains(&k)) {
+                continue;
+            }
+            orders += 1;
+            let got = realise(&blend(&order.map(|k| given[k])), &order.map(|k| weights[k])).paint;
+            // The two of a kind share a hash and stand in the order given: sums of four go another way round, three
+            // roundings of each, and that of the products.
+            let accepted = 5.0 * f64::EPSILON * size;
+            for k in 0..3 {
+                assert!((got.diffuse[k] - want.diffuse[k]).abs() <= accepted * 0.5);
+            }
+            for (x, y) in got.lobes.iter().zip(&want.lobes) {
+                // Logarithms below 3, through an exponential.
+                assert!(
+                    (x.alpha / y.alpha - 1.0).abs() <= 8.0 * accepted,
+                    "{order:?}"
+                );
+                assert!((x.f0 - y.f0).abs() <= accepted, "{order:?}");
+            }
+            let (x, y) = (got.flakes.expect("has"), want.flakes.as_ref().expect("has"));
+            assert_eq!(x.offsets, y.offsets, "{order:?}");
+            assert_eq!(x.probability, y.probability, "{order:?}");
+            let corners = x
+                .lower
+                .iter()
+                .zip(&y.lower)
+                .chain(x.upper.iter().zip(&y.upper));
+            for (x, y) in corners.flat_map(|(x, y)| x.iter().zip(y)) {
+                // Corners of the originals are below 70 in L and 30 in a and b.
+                let accepted = 5.0 * 2.0_f64.powi(-24) * size * 70.0;
+                assert!(f64::from(x - y).abs() <= accepted, "{order:?}: {x} {y}");
+            }
+        }
+        assert_eq!(orders, 24);
     }
 }
 
@@ -205,11 +328,8 @@ fn a_paint_given_twice_counts_with_both_weights() {
             );
             for c in 0..3 {
                 // Weights and parameters agree to an EPS or two; the exponent of a lobe multiplies that by up to 745,
-                // f32 corners add 1e-7 of the flakes. The correspondence of (a, a, b) may differ from that of (a, b),
-                // which moves means of light at inner weights: only ends are compared through light.
-                if w.contains(&1.0) {
-                    assert!((x[c] - y[c]).abs() <= 1e-6 * y[c] + 1e-9, "{x:?} {y:?}");
-                }
+                // f32 corners add 1e-7 of the flakes. A paint that comes again goes where it went before.
+                assert!((x[c] - y[c]).abs() <= 1e-6 * y[c] + 1e-9, "{x:?} {y:?}");
             }
         }
         for (p, q) in x.diffuse.iter().zip(y.diffuse) {
@@ -277,6 +397,38 @@ fn masses_of_a_millionth_of_a_millionth_are_not_lost() {
 }
 
 #[test]
+fn masses_of_a_millionth_of_a_millionth_on_both_sides_are_not_lost() {
+    let light = |seed: u64, heavy: usize| {
+        let mut paint = metallic(seed, &[0.0], &[0.0]);
+        let mut masses = [1e-12; 7];
+        masses[heavy] = 1.0 - 6e-12;
+        paint.flakes.as_mut().expect("has flakes").probability = masses.to_vec().into();
+        paint
+    };
+    for (heavy_a, heavy_b) in [(3, 3), (0, 6), (5, 1)] {
+        let paints = [light(33, heavy_a), light(34, heavy_b)];
+        let blend = blend(&[&paints[0], &paints[1]]);
+        for (k, original) in paints.iter().enumerate() {
+            let back = realise(&blend, &unit_weights(2, k)).paint;
+            let (got, want) = (
+                regrouped(back.flakes.as_ref().expect("has"), 0),
+                regrouped(original.flakes.as_ref().expect("has"), 0),
+            );
+            assert_eq!(got.len(), 7, "{heavy_a} {heavy_b}: a box was lost");
+            for (x, y) in got.values().zip(want.values()) {
+                // Masses are whole units of 2^-55, and each of at most 13 flows is scaled by one side's mass per unit,
+                // which rounding to units moved by half a unit of 36,000: 13 · 2^-56 of the whole, and as many units of
+                // a sum that holds them.
+                assert!(
+                    (x - y).abs() <= 26.0 * 2.0_f64.powi(-55),
+                    "{x:e} instead of {y:e}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn paints_that_differ_by_less_than_a_rounding_blend_into_themselves() {
     let a = metallic(41, H, D);
     let mut b = a.clone();
@@ -322,6 +474,42 @@ fn flakes_fade_out_towards_a_solid_color_and_never_jump() {
     };
     let steps: Vec<f64> = (0..=20).map(|k| energy(f64::from(k) / 20.0)).collect();
     assert!(steps.windows(2).all(|w| w[1] <= w[0]), "{steps:?}");
+    // Corners are (1 − t) of the metallic's. f moves by its Lab's parts in 116, 500 and 200, light by 3 f² of that, and
+    // the rows of the matrix from XYZ, white's 1.09 included, sum to 10.7 in size.
+    let flakes = metallic.flakes.as_ref().expect("has flakes");
+    let lipschitz: f64 = (0..flakes.slices())
+        .flat_map(|k| {
+            let slice = flakes.slice_at(k);
+            (0..slice.probability.len()).map(move |k| {
+                let most = |axis: usize| {
+                    f64::from(slice.lower[k][axis].abs().max(slice.upper[k][axis].abs()))
+                };
+                let slope = most(0) / 116.0 + most(1) / 500.0 + most(2) / 200.0;
+                let f = slope + 16.0 / 116.0;
+                slice.probability[k] * 10.7 * 3.0 * f * f * slope / std::f64::consts::PI
+            })
+        })
+        .sum();
+    let mut times: Vec<f64> = (0..=1000).map(|k| f64::from(k) / 1000.0).collect();
+    for near in [1e-3, 1e-6, 1e-9, 1e-12, 1e-15] {
+        times.extend([near, 1.0 - near, 0.5 + near]);
+    }
+    times.sort_by(f64::total_cmp);
+    let (mut steepest, mut before) = (0.0_f64, energy(0.0));
+    for t in times.windows(2) {
+        let after = energy(t[1]);
+        let step = t[1] - t[0];
+        // Weights, products and sums of corners in 32 bits are as good as a step of 2^-22.
+        assert!(
+            (after - before).abs() <= lipschitz * (step + 2.0_f64.powi(-22)),
+            "{t:?}: {before} to {after}"
+        );
+        if step > 1e-4 {
+            steepest = steepest.max((after - before).abs() / step);
+        }
+        before = after;
+    }
+    assert!(steepest > 0.05 * lipschitz, "{steepest} of {lipschitz}");
     // Black's Lab is 0, whose light is (16/116 − 4/29) rounded: no more than EPS.
     assert!(steps[20] <= 36.0 * f64::EPSILON, "{steps:?}");
     assert_is(
@@ -367,43 +555,52 @@ fn differing_grids_blend_on_their_union_and_keep_every_own_slice() {
 
 #[test]
 fn halfway_between_two_peaks_is_one_peak_and_not_two() {
-    // Two peaks of ten clusters each: halfway lies at 50 to 59.5, where a mixture would have stayed at 20 and at 80.
-    let spread = |l: f32| -> CarPaint {
-        let cluster = |k: u8| {
-            let corner = l + f32::from(k);
-            (0.1, [corner, 0.0, 0.0], [corner + 0.5, 0.0, 0.0])
+    // Two peaks of ten clusters each, from close together to far apart: halfway lies at 50, where a mixture would have
+    // stayed at 20 and at 80. (The tie-break tells two clusters apart from 0.13 L on: 2 ΔL² · 5e-10/D against the prices'
+    // 4e-15 D, D = 70.)
+    for spacing in [1.0_f32, 0.5, 0.3, 0.2] {
+        let spread = |l: f32| -> CarPaint {
+            let cluster = |k: u8| {
+                let corner = l + f32::from(k) * spacing;
+                (0.1, [corner, 0.0, 0.0], [corner + 0.5 * spacing, 0.0, 0.0])
+            };
+            CarPaint {
+                flakes: Some(flakes(
+                    &[0.0],
+                    &[0.0],
+                    &(0..10).map(cluster).collect::<Vec<_>>(),
+                )),
+                ..solid(71)
+            }
         };
-        CarPaint {
-            flakes: Some(flakes(
-                &[0.0],
-                &[0.0],
-                &(0..10).map(cluster).collect::<Vec<_>>(),
-            )),
-            ..solid(71)
+        let blend = blend(&[&spread(20.0), &spread(80.0)]);
+        let half = realise(&blend, &[0.5, 0.5]).paint.flakes.expect("has");
+        assert!(half.probability.len() <= 19);
+        // Two halves of corners up to 90: three roundings of 2^-24 each.
+        let rounding = 3.0 * 2.0_f32.powi(-24) * 90.0;
+        for (low, high) in half.lower.iter().zip(&half.upper) {
+            // Monotone: the k-th of one with the k-th of the other, at 50 + k.
+            assert!(
+                low[0] >= 50.0 - rounding && high[0] <= 50.0 + 9.5 * spacing + rounding,
+                "{spacing}: {low:?} {high:?}"
+            );
         }
-    };
-    let blend = blend(&[&spread(20.0), &spread(80.0)]);
-    let half = realise(&blend, &[0.5, 0.5]).paint.flakes.expect("has");
-    assert!(half.probability.len() <= 19);
-    for (low, high) in half.lower.iter().zip(&half.upper) {
-        // Monotone: the k-th of one with the k-th of the other, at 50 + k, exact in f32.
-        assert!(low[0] >= 50.0 && high[0] <= 59.5, "{low:?} {high:?}");
+        // And it is as wide as the two it lies between, where the reversed plan of equal cost would have been a point.
+        let center = |k: usize| f64::from(half.lower[k][0] + half.upper[k][0]) / 2.0;
+        let mean: f64 = (0..half.probability.len())
+            .map(|k| half.probability[k] * center(k))
+            .sum();
+        let spread = (0..half.probability.len())
+            .map(|k| half.probability[k] * (center(k) - mean).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        // Ten points apart by the spacing: √((100 − 1)/12) of it, of masses good to 1e-14 and centers to the rounding.
+        let want = (99.0_f64 / 12.0).sqrt() * f64::from(spacing);
+        assert!(
+            (spread - want).abs() <= f64::from(rounding),
+            "{spacing}: {spread} instead of {want}"
+        );
     }
-    // And it is as wide as the two it lies between, where the reversed plan of equal cost would have been a point. (The
-    // tie-break tells two clusters apart from 0.13 L on: 2 ΔL² · 5e-10/D against the prices' 4e-15 D, D = 70.)
-    let center = |k: usize| f64::from(half.lower[k][0] + half.upper[k][0]) / 2.0;
-    let mean: f64 = (0..half.probability.len())
-        .map(|k| half.probability[k] * center(k))
-        .sum();
-    let spread = (0..half.probability.len())
-        .map(|k| half.probability[k] * (center(k) - mean).powi(2))
-        .sum::<f64>()
-        .sqrt();
-    // Ten points 1 apart: √((100 − 1)/12), of masses good to 1e-14.
-    assert!(
-        (spread - (99.0_f64 / 12.0).sqrt()).abs() < 1e-10,
-        "{spread}"
-    );
 }
 
 #[test]

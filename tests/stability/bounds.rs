@@ -66,16 +66,16 @@ const NUMBERS: [Bounded; 15] = [
     ("lobes[0].f0", 0.0, 1.0, |p, v| p.lobes[0].f0 = v),
     ("color_table[3]", -2000.0, 2000.0, set_node),
     ("color_table.overall", -2000.0, 2000.0, set_overall),
-    ("flakes.texel_um", f64::MIN_POSITIVE, 1e5, |p, v| {
+    ("flakes.texel_um", 1e-3, 1e5, |p, v| {
         flakes(p).texture.texel_um = v;
     }),
-    ("flakes.grain_um", f64::MIN_POSITIVE, 1e6, |p, v| {
+    ("flakes.grain_um", 1e-3, 1e6, |p, v| {
         flakes(p).texture.grain_um = v;
     }),
-    ("flakes.lifetime_deg", f64::MIN_POSITIVE, 1e4, |p, v| {
+    ("flakes.lifetime_deg[1]", 0.01, 1e4, |p, v| {
         flakes(p).texture.lifetime_deg[1] = v;
     }),
-    ("flakes.lifetime_deg", f64::MIN_POSITIVE, 1e4, |p, v| {
+    ("flakes.persistence_deg[0]", 0.01, 1e4, |p, v| {
         flakes(p).texture.persistence_deg[0] = v;
     }),
     ("flakes.slices[1].box[2][0]", -2000.0, 2000.0, |p, v| {

@@ -1,9 +1,11 @@
 //! Numbers on their way into files: nothing that is no number, no overflow and no subnormal half is ever written.
 
-use crate::paints::{D, H, flakes, metallic, solid};
-use carpaint::color::Lab;
+use crate::paints::{D, H, at, blend, extreme, metallic, pairs, solid};
+use carpaint::accuracy::Profile;
 use carpaint::export::{About, ExportError, ExportSettings, Precision, bundle, glb};
-use carpaint::paint::{CarPaint, ColorTable, Limits, Provenance};
+use carpaint::paint::{CarPaint, Chi, Coat, Direction, Limits, Provenance};
+use carpaint::render::{FilmError, Scene, Shape, render, texels};
+use carpaint::workshop::{Pairs, Thing, bundle_blend, evaluate};
 use std::io::{Cursor, Read};
 
 fn about() -> About {
@@ -22,7 +24,10 @@ fn files(paint: &CarPaint, precision: Precision) -> Vec<(String, Vec<u8>)> {
         precision,
         ..ExportSettings::default()
     };
-    let bytes = bundle(paint, &about(), &settings).expect("a bundle");
+    unpacked(bundle(paint, &about(), &settings).expect("a bundle"))
+}
+
+fn unpacked(bytes: Vec<u8>) -> Vec<(String, Vec<u8>)> {
     let mut zip = zip::ZipArchive::new(Cursor::new(bytes)).expect("a zip");
     (0..zip.len())
         .map(|k| {
@@ -54,34 +59,6 @@ fn halves(bytes: &[u8]) -> Vec<half::f16> {
         }
     }
     found
-}
-
-/// Lightness of a gray whose linear light is `y`.
-fn gray(y: f64) -> Lab {
-    Lab::from_rgb([y; 3])
-}
-
-/// A paint whose table and slices go from far below a half's smallest number to far above its largest.
-fn extreme() -> CarPaint {
-    let mut paint = metallic(5, &[0.0, 20.0, 40.0], &[0.0, 30.0]);
-    let light = [0.0, 1e-9, 3e-8, 5e-5, 6.2e-5, -4e-5, 1.0, 5000.0];
-    let nodes: Vec<Lab> = light.iter().map(|y| gray(*y)).collect();
-    let angles = crate::paints::grid(&[0.0, 10.0, 30.0, 60.0]);
-    paint.color_table =
-        ColorTable::new(angles, crate::paints::grid(&[0.0, 45.0]), nodes, gray(0.5))
-            .expect("eight nodes");
-    let point = |k: u8| {
-        let tiny = 1e-6 * 10.0_f32.powi(i32::from(k % 6));
-        (
-            0.125,
-            [tiny, -tiny, 3e-7],
-            [tiny + f32::from(k) * 280.0, tiny, 1999.0],
-        )
-    };
-    let boxes: Vec<_> = (0..8).map(point).collect();
-    paint.flakes = Some(flakes(&[0.0, 20.0, 40.0], &[0.0, 30.0], &boxes));
-    paint.validate(&Limits::default()).expect("within bounds");
-    paint
 }
 
 #[test]
@@ -178,6 +155,167 @@ fn a_glb_of_an_extreme_paint_holds_finite_numbers_only() {
         open.extend(fields.filter(|(key, _)| *key != "extras").map(|(_, v)| v));
     }
     assert!(numbers > 10, "{numbers}");
+}
+
+/// Fails unless every half of an EXR file is 0 or a normal number and every float is finite; counts them.
+fn assert_sound_exr(bytes: &[u8], what: &str) -> usize {
+    use exr::prelude::*;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .expect("an EXR file");
+    let mut count = 0;
+    for channel in image.layer_data.channel_data.list {
+        match channel.sample_data {
+            FlatSamples::F16(values) => {
+                count += values.len();
+                let sound = |v: &half::f16| v.is_normal() || v.to_f32() == 0.0;
+                assert!(values.iter().all(sound), "{what}: {}", channel.name);
+            }
+            FlatSamples::F32(values) => {
+                count += values.len();
+                assert!(
+                    values.iter().all(|v| v.is_finite()),
+                    "{what}: {}",
+                    channel.name
+                );
+            }
+            FlatSamples::U32(values) => count += values.len(),
+        }
+    }
+    count
+}
+
+#[test]
+fn pictures_of_an_extreme_paint_hold_finite_numbers_only() {
+    let limits = Limits::default();
+    let mut coated = extreme();
+    coated.coat = Some(Coat::smooth(4.0));
+    for (k, paint) in [extreme(), coated].iter().enumerate() {
+        for shape in [Shape::Sphere, Shape::Capsule, Shape::Panel] {
+            let mut scene = Scene::new(shape, [48, 40]);
+            scene.samples_per_pixel = 4;
+            let drawn = render(paint, &scene, &limits, &|_| ()).expect("a picture");
+            let pixels = drawn.film.pixels();
+            assert!(
+                pixels.iter().flatten().all(|v| v.is_finite()),
+                "{k}, {shape:?}"
+            );
+            // Light of flakes up to 2e4 under a key light reaches the file: the picture is not black.
+            assert!(
+                pixels.iter().flatten().any(|v| *v > 10.0),
+                "{k}, {shape:?} shows no extreme"
+            );
+            let bytes = drawn.film.to_exr().expect("an EXR");
+            assert_eq!(
+                assert_sound_exr(&bytes, "a preview"),
+                3 * 48 * 40,
+                "{k}, {shape:?}"
+            );
+            drawn.film.to_png().expect("a PNG");
+            let told = serde_json::to_value(&drawn.report).expect("JSON");
+            let sampling = told["sampling"]
+                .as_object()
+                .expect("what is left to chance");
+            assert!(sampling.values().any(serde_json::Value::is_number));
+        }
+        for angles in [[0.0, 0.0], [90.0, 90.0], [20.0, 15.0]] {
+            let bytes = texels(paint, angles[0], angles[1], [64, 48], 3, &limits).expect("texels");
+            assert_eq!(
+                assert_sound_exr(&bytes, "texels"),
+                3 * 64 * 48,
+                "{angles:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_picture_with_a_pixel_that_is_no_number_is_refused_or_never_made() {
+    // A box that is no number is refused when the paint is validated; drawn all the same, it must not become a file.
+    let mut paint = metallic(8, H, D);
+    let made = paint.flakes.as_mut().expect("has flakes");
+    for corner in made.upper.iter_mut().chain(&mut made.lower) {
+        corner[0] = f32::NAN;
+    }
+    paint.validate(&Limits::default()).expect_err("no paint");
+    let mut scene = Scene::new(Shape::Sphere, [16, 16]);
+    scene.samples_per_pixel = 1;
+    let drawn = render(&paint, &scene, &Limits::default(), &|_| ()).expect("a picture");
+    match drawn.film.to_exr() {
+        Ok(bytes) => assert_eq!(assert_sound_exr(&bytes, "a preview"), 3 * 16 * 16),
+        Err(error) => assert!(matches!(error, FilmError::NotANumber { .. }), "{error}"),
+    }
+}
+
+#[test]
+fn the_bundle_of_a_blend_of_extreme_paints_holds_finite_numbers_only() {
+    let blend = blend(&[&extreme(), &metallic(9, &[0.0, 20.0], &[0.0, 30.0])]);
+    for precision in [Precision::F16, Precision::F32] {
+        let mut profile = Profile::standard();
+        profile.export.precision = precision;
+        let thing = Thing::Blend(Box::new(blend.clone()));
+        let made = bundle_blend(&thing, &profile).expect("a bundle");
+        let (mut pictures, mut documents) = (0, 0);
+        for (name, bytes) in unpacked(made.bytes) {
+            if name.ends_with(".exr") {
+                pictures += usize::from(assert_sound_exr(&bytes, &name) > 0);
+            } else if name.ends_with(".json") {
+                documents += usize::from(numbers_of(&bytes, &name) > 10);
+            }
+        }
+        assert!(
+            pictures >= 4 && documents >= 1,
+            "{pictures} pictures, {documents} documents"
+        );
+    }
+}
+
+/// Fails where a JSON document holds a `null` in a list of numbers, which is how a number that is none is written; counts
+/// the numbers.
+fn numbers_of(bytes: &[u8], what: &str) -> usize {
+    let json: serde_json::Value = serde_json::from_slice(bytes).expect("JSON");
+    let (mut open, mut numbers) = (vec![&json], 0);
+    while let Some(value) = open.pop() {
+        numbers += usize::from(value.is_number());
+        let list = value.as_array().into_iter().flatten();
+        for entry in list {
+            assert!(!entry.is_null(), "{what}: a number was lost in {value}");
+            open.push(entry);
+        }
+        // An end of a documented range that is open is `null` on purpose.
+        let fields = value.as_object().into_iter().flatten();
+        open.extend(fields.filter(|(key, _)| *key != "range").map(|(_, v)| v));
+    }
+    numbers
+}
+
+#[test]
+fn values_of_an_extreme_paint_are_numbers_in_json() {
+    let grazing = [1.0, 1e-3, 1e-8, 1e-160, 1e-300, 0.0];
+    let list: Vec<[Direction; 2]> = grazing
+        .iter()
+        .flat_map(|&z| grazing.map(|w| [at(z, 0.0), at(w, std::f64::consts::PI)]))
+        .chain(pairs(40).into_iter().map(|(wi, wo)| [wi, wo]))
+        .collect();
+    let text = serde_json::to_vec(&serde_json::json!({ "pairs": list })).expect("JSON");
+    let asked = Pairs::from_json("pairs", &text, &Limits::default()).expect("unit vectors");
+    for coat in [None, Some(Coat::smooth(1.5)), Some(Coat::smooth(1.0))] {
+        for chi in [Chi::Table, Chi::Overall] {
+            let values = evaluate(&CarPaint { coat, ..extreme() }, &asked, chi);
+            let json = serde_json::to_vec(&values).expect("JSON");
+            let mirrors = usize::from(coat.is_some());
+            assert_eq!(
+                numbers_of(&json, "values"),
+                (3 + mirrors) * list.len(),
+                "{coat:?}"
+            );
+        }
+    }
 }
 
 #[test]

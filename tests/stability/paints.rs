@@ -3,7 +3,7 @@
 use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights, Realised};
 use carpaint::color::Lab;
 use carpaint::paint::{
-    AngleGrid, CarPaint, Coat, ColorTable, Direction, FlakeTexture, Flakes, Lobe,
+    AngleGrid, CarPaint, Coat, ColorTable, Direction, FlakeTexture, Flakes, Limits, Lobe,
 };
 
 /// Half angles of ordinary slices.
@@ -124,6 +124,33 @@ pub fn solid(seed: u64) -> CarPaint {
             .expect("one color a node"),
         flakes: None,
     }
+}
+
+/// Lightness of a gray whose linear light is `y`.
+fn gray(y: f64) -> Lab {
+    Lab::from_rgb([y; 3])
+}
+
+/// A paint whose table and slices go from far below a half's smallest number to far above its largest.
+pub fn extreme() -> CarPaint {
+    let mut paint = metallic(5, &[0.0, 20.0, 40.0], &[0.0, 30.0]);
+    let light = [0.0, 1e-9, 3e-8, 5e-5, 6.2e-5, -4e-5, 1.0, 5000.0];
+    let nodes: Vec<Lab> = light.iter().map(|y| gray(*y)).collect();
+    let angles = grid(&[0.0, 10.0, 30.0, 60.0]);
+    paint.color_table =
+        ColorTable::new(angles, grid(&[0.0, 45.0]), nodes, gray(0.5)).expect("eight nodes");
+    let point = |k: u8| {
+        let tiny = 1e-6 * 10.0_f32.powi(i32::from(k % 6));
+        (
+            0.125,
+            [tiny, -tiny, 3e-7],
+            [tiny + f32::from(k) * 280.0, tiny, 1999.0],
+        )
+    };
+    let boxes: Vec<_> = (0..8).map(point).collect();
+    paint.flakes = Some(flakes(&[0.0, 20.0, 40.0], &[0.0, 30.0], &boxes));
+    paint.validate(&Limits::default()).expect("within bounds");
+    paint
 }
 
 pub fn blend(paints: &[&CarPaint]) -> Blend {

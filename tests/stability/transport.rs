@@ -17,10 +17,11 @@ mod clouds;
 mod generated;
 
 use carpaint::transport::{
-    Cost, MOST_POINTS, Method, Plan, Problem, Side, Solver, TransportError, Workspace, solve,
+    Cost, MOST_POINTS, Method, Plan, Problem, Side, Sinkhorn, Solver, TransportError, Workspace,
+    solve,
 };
 use certificate::{faults, reference};
-use clouds::{Clouds, nasty, paint_slices};
+use clouds::{Clouds, light_on_both_sides, nasty, of_all_scales, paint_slices};
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -41,6 +42,10 @@ fn fuzzed() -> usize {
         Err(_) => FUZZED,
     }
 }
+
+/// What `good_lp` failed on when this was written, of 900 and 900 slices and of the 2,000 random problems: a silent oracle
+/// proves nothing, so that one that falls silent is told from one that agrees. (With a fifth more: still none.)
+const KNOWN_FAILURES: usize = 0;
 
 /// Judges slices of paints by certificate and by `good_lp`; returns how often the latter failed.
 fn compare_with_linear_program(slices: &[Clouds]) -> usize {
@@ -82,7 +87,10 @@ fn compare_with_linear_program(slices: &[Clouds]) -> usize {
 fn slices_of_paints_cost_what_the_linear_program_says() {
     let failed = compare_with_linear_program(&paint_slices(7));
     println!("good_lp failed on {failed} of 900 paint slices");
-    assert!(failed <= 45, "the oracle is silent on {failed} of 900");
+    assert!(
+        failed <= KNOWN_FAILURES,
+        "the oracle is silent on {failed} of 900"
+    );
 }
 
 #[test]
@@ -93,7 +101,10 @@ fn slices_of_another_generator_cost_what_the_linear_program_says() {
     assert_eq!(slices.len(), 900);
     let failed = compare_with_linear_program(&slices);
     println!("good_lp failed on {failed} of the 900 generated slices");
-    assert!(failed <= 45, "the oracle is silent on {failed} of 900");
+    assert!(
+        failed <= KNOWN_FAILURES,
+        "the oracle is silent on {failed} of 900"
+    );
 }
 
 #[test]
@@ -143,11 +154,8 @@ fn problems_meant_to_break_a_solver_are_certified() {
         "{count} of {ALL} problems certified; good_lp agreed on {compared} and failed on {failed} of {}",
         count.div_ceil(WITH_LP_EVERY)
     );
-    assert!(
-        4 * failed <= compared + failed,
-        "the oracle is silent on {failed} of {}",
-        compared + failed
-    );
+    assert!(failed <= KNOWN_FAILURES, "the oracle is silent on {failed}");
+    assert_eq!(compared + failed, count.div_ceil(WITH_LP_EVERY));
 }
 
 /// The least cost between points on a line, by sorting: mass moves in order (Villani 2003, 2.2).
@@ -207,6 +215,88 @@ fn on_a_line_the_cost_is_the_sorted_one() {
 }
 
 #[test]
+fn distances_of_twenty_four_decades_in_one_problem_are_certified() {
+    let (mut workspace, mut plan) = (Workspace::default(), Plan::default());
+    for seed in 0..2000 {
+        let mut clouds = of_all_scales(&mut StdRng::seed_from_u64(seed));
+        for cost in [Cost::SquaredDistance, Cost::Distance] {
+            let solved =
+                Method::Exact.solve_into(&clouds.problem(), cost, &mut workspace, &mut plan);
+            solved.unwrap_or_else(|error| panic!("seed {seed}, {cost:?}: {error}"));
+            if let Some(fault) = faults(&clouds, cost, &plan) {
+                panic!("seed {seed}, {cost:?}: {fault}\n{clouds:?}");
+            }
+        }
+        // Each point beside itself, a millionth of its own distance away: no plan that mixes the scales is as cheap.
+        let near: Vec<[f64; 3]> = clouds
+            .source
+            .iter()
+            .map(|p| p.map(|x| x * (1.0 + 1e-6)))
+            .collect();
+        let (from, masses) = (&clouds.source, &clouds.source_masses);
+        let problem = Problem::new(from, masses, &near, masses).expect("fine");
+        let plan = solve(&problem, Method::Exact, Cost::Distance, &mut workspace).expect("solved");
+        let each = from.iter().zip(&near).zip(problem.source().masses());
+        let beside: f64 = each
+            .map(|((p, q), m)| m * Cost::Distance.between(*p, *q))
+            .sum();
+        let largest = from.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+        // 1e-9 is promised of the cost, and costs of the largest are rounded where prices mix them with the others.
+        assert!(
+            plan.cost <= beside * (1.0 + 1e-9) + 16.0 * f64::EPSILON * largest,
+            "seed {seed}: {} where {beside} suffices",
+            plan.cost
+        );
+        // On a line the optimum is known.
+        for point in clouds.source.iter_mut().chain(&mut clouds.target) {
+            *point = [point[0], 0.0, 0.0];
+        }
+        let plan = solve(
+            &clouds.problem(),
+            Method::Exact,
+            Cost::Distance,
+            &mut workspace,
+        );
+        let (plan, want) = (plan.expect("solved"), sorted_cost(&clouds, 1));
+        // The leftovers of the sorted form's subtractions are 50 EPS of the mass, each moved across both clouds at most.
+        let extent = clouds.source.iter().chain(&clouds.target);
+        let extent = extent.fold(0.0_f64, |m, p| m.max(p[0].abs()));
+        assert!(
+            (plan.cost - want).abs() <= 1e-9 * want + 50.0 * f64::EPSILON * 2.0 * extent,
+            "seed {seed}: {} for {want}",
+            plan.cost
+        );
+    }
+}
+
+#[test]
+fn the_lightest_masses_on_both_sides_all_arrive() {
+    let (mut workspace, mut plan) = (Workspace::default(), Plan::default());
+    let mut light_to_light = 0;
+    for seed in 0..2000 {
+        let clouds = light_on_both_sides(&mut StdRng::seed_from_u64(seed));
+        for cost in [Cost::SquaredDistance, Cost::Distance] {
+            let solved =
+                Method::Exact.solve_into(&clouds.problem(), cost, &mut workspace, &mut plan);
+            solved.unwrap_or_else(|error| panic!("seed {seed}, {cost:?}: {error}"));
+            // Marginals to 1e-12 of the whole, none of them empty, and a source's to 1e-9 of itself; a light target that a
+            // light source feeds may be off relatively.
+            if let Some(fault) = faults(&clouds, cost, &plan) {
+                panic!("seed {seed}, {cost:?}: {fault}\n{clouds:?}");
+            }
+            light_to_light += plan
+                .entries
+                .iter()
+                .filter(|e| {
+                    clouds.source_masses[e.source] < 1.0 && clouds.target_masses[e.target] < 1.0
+                })
+                .count();
+        }
+    }
+    assert!(light_to_light > 10_000, "{light_to_light}");
+}
+
+#[test]
 fn moving_a_cloud_by_a_vector_costs_its_length() {
     let mut workspace = Workspace::default();
     for seed in 0..500 {
@@ -253,32 +343,86 @@ fn a_cloud_onto_itself_costs_nothing_whatever_its_duplicates() {
     }
 }
 
+/// `ln Σ exp(x)`.
+fn log_sum_exp(exponents: &[f64]) -> f64 {
+    let largest = exponents.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let sum: f64 = exponents.iter().map(|x| (x - largest).exp()).sum();
+    largest + sum.ln()
+}
+
+/// Costs as the solvers tilt them to break ties: `d (1 + 5e-10 d/D)`, D the diagonal of the box around both clouds.
+fn tilted_costs(clouds: &Clouds) -> Vec<Vec<f64>> {
+    let all = || clouds.source.iter().chain(&clouds.target);
+    let side = |k: usize| {
+        let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| {
+            (low.min(p[k]), high.max(p[k]))
+        });
+        high - low
+    };
+    let diagonal = side(0).hypot(side(1)).hypot(side(2));
+    let tilted = |s: [f64; 3], t: [f64; 3]| {
+        let d = Cost::Distance.between(s, t);
+        if diagonal > 0.0 {
+            d + 5e-10 * d * (d / diagonal)
+        } else {
+            d
+        }
+    };
+    let row = |&s: &[f64; 3]| clouds.target.iter().map(|&t| tilted(s, t)).collect();
+    clouds.source.iter().map(row).collect()
+}
+
+/// What the masses arriving at the sources are off by in all, from the potentials of the sources alone: those of the
+/// targets follow, since the solver leaves the targets exact.
+fn residual_of(problem: &Problem, costs: &[Vec<f64>], potentials: &[f64], eta: f64) -> f64 {
+    let (p, q) = (problem.source().masses(), problem.target().masses());
+    let of_target = |j: usize| {
+        let exponents: Vec<f64> = costs
+            .iter()
+            .zip(potentials)
+            .map(|(row, f)| (f - row[j]) / eta)
+            .collect();
+        q[j].ln() - log_sum_exp(&exponents)
+    };
+    let g: Vec<f64> = (0..q.len()).map(of_target).collect();
+    let sent = |(row, f): (&Vec<f64>, &f64)| -> f64 {
+        row.iter()
+            .zip(&g)
+            .map(|(w, g)| ((f - w) / eta + g).exp())
+            .sum()
+    };
+    let sent = costs.iter().zip(potentials).map(sent);
+    sent.zip(p).map(|(sent, mass)| (sent - mass).abs()).sum()
+}
+
 #[test]
 fn smaller_and_smaller_smoothing_converges_within_its_residual_or_says_that_it_cannot() {
     let mut workspace = Workspace::default();
     let hard = (0..40).map(|seed| nasty(&mut StdRng::seed_from_u64(1_000_000 + seed)));
     let slices = paint_slices(9).into_iter().step_by(300);
-    let (mut met, mut refused) = (0, 0);
+    let (mut met, mut refused, mut owed) = (0, 0, 0);
     for (k, clouds) in slices.chain(hard).enumerate() {
         let problem = clouds.problem();
         let exact = solve(&problem, Method::Exact, Cost::Distance, &mut workspace).expect("solved");
-        let mean = {
-            let pairs = clouds.source.iter().flat_map(|&s| {
-                clouds
-                    .target
-                    .iter()
-                    .map(move |&t| Cost::Distance.between(s, t))
-            });
-            pairs.sum::<f64>() / (clouds.source.len() * clouds.target.len()) as f64
-        };
+        let costs = tilted_costs(&clouds);
+        let diameter = costs.iter().flatten().copied().fold(0.0, f64::max);
+        let pairs = (clouds.source.len() * clouds.target.len()) as f64;
+        let mean = costs.iter().flatten().sum::<f64>() / pairs;
         for power in 0..=8 {
             let epsilon = 10.0_f64.powi(-power);
-            match solve(
+            let eta = if mean > 0.0 { epsilon * mean } else { 1.0 };
+            // A step contracts Hilbert's metric by tanh²(diameter/2η) (Franklin and Lorenz 1989): by 1.3e-3 up to a diameter
+            // of 8 η, so that from 16 it is below 1e-6 after ln(16e6)/1.3e-3 = 12,500 steps of the 20,000. The stages
+            // before it have four times the η and take a few dozen.
+            let must = diameter <= 8.0 * eta;
+            owed += usize::from(must);
+            let solved = solve(
                 &problem,
                 Method::Sinkhorn { epsilon },
                 Cost::Distance,
                 &mut workspace,
-            ) {
+            );
+            match solved {
                 Ok(plan) => {
                     met += 1;
                     let numbers = plan.source_duals.iter().chain(&plan.target_duals);
@@ -288,6 +432,19 @@ fn smaller_and_smaller_smoothing_converges_within_its_residual_or_says_that_it_c
                             .all(|v| v.is_finite()),
                         "{k}, ε {epsilon}"
                     );
+                    // Exponents as large as diameter/η are rounded, and so are potentials: an EPS of them each.
+                    let potentials: Vec<f64> = plan
+                        .source_duals
+                        .iter()
+                        .map(|u| u * (1.0 + 5e-10))
+                        .collect();
+                    let residual = residual_of(&problem, &costs, &potentials, eta);
+                    let rounding =
+                        16.0 * f64::EPSILON * (1.0 + largest(&potentials).max(diameter) / eta);
+                    assert!(
+                        residual <= Sinkhorn::RESIDUAL + rounding,
+                        "{k}, ε {epsilon}: residual {residual:e}, ± {rounding:e}"
+                    );
                     let rounding = 1e-12 * mean + 1e-9 * exact.cost;
                     // Feasible, so not cheaper than the optimum; and its own gap covers the rest.
                     assert!(plan.cost >= exact.cost - rounding, "{k}, ε {epsilon}");
@@ -295,11 +452,10 @@ fn smaller_and_smaller_smoothing_converges_within_its_residual_or_says_that_it_c
                         plan.cost - plan.gap <= exact.cost + rounding,
                         "{k}, ε {epsilon}"
                     );
-                    // Entropy of a plan is at most ln(nm); rounding to a vertex moves the residual, 1e-6, twice, by at
-                    // most the diameter, which is below nm times the mean cost.
-                    let pairs = (clouds.source.len() * clouds.target.len()) as f64;
+                    // Entropy of a plan is at most ln(nm), and masses off by a residual cost four times it across the
+                    // diameter (Altschuler, Weed and Rigollet 2017, proof of theorem 1).
                     let bound =
-                        epsilon * mean * pairs.ln().max(0.0) + 2.0 * 1e-6 * pairs * mean + rounding;
+                        eta * pairs.ln().max(0.0) + 4.0 * Sinkhorn::RESIDUAL * diameter + rounding;
                     assert!(
                         plan.cost - exact.cost <= bound,
                         "{k}, ε {epsilon}: {} over {}",
@@ -308,9 +464,16 @@ fn smaller_and_smaller_smoothing_converges_within_its_residual_or_says_that_it_c
                     );
                 }
                 Err(TransportError::NotConverged {
-                    residual, promised, ..
+                    steps,
+                    residual,
+                    promised,
                 }) => {
                     refused += 1;
+                    assert!(!must, "{k}, ε {epsilon}: refused where it converges");
+                    assert_eq!(
+                        (steps, promised),
+                        (Sinkhorn::MOST_STEPS, Sinkhorn::RESIDUAL)
+                    );
                     assert!(
                         residual > promised || residual.is_nan(),
                         "{k}, ε {epsilon}: {residual:e} was good enough"
@@ -320,8 +483,10 @@ fn smaller_and_smaller_smoothing_converges_within_its_residual_or_says_that_it_c
             }
         }
     }
-    println!("Sinkhorn met its promise {met} times and said {refused} times that it could not");
-    assert!(met > 2 * refused, "met {met}, refused {refused}");
+    println!(
+        "Sinkhorn met its promise {met} times, {owed} of them owed, and said {refused} times that it could not"
+    );
+    assert!(owed > 40, "{owed}");
     for epsilon in [0.0, -1.0, 1e-10, 1e4, f64::NAN, f64::INFINITY] {
         let problem = Problem::new(&[[0.0; 3]], &[1.0], &[[1.0; 3]], &[1.0]).expect("fine");
         let refused = solve(
@@ -335,6 +500,10 @@ fn smaller_and_smaller_smoothing_converges_within_its_residual_or_says_that_it_c
             "{epsilon}"
         );
     }
+}
+
+fn largest(numbers: &[f64]) -> f64 {
+    numbers.iter().fold(0.0, |m, v| v.abs().max(m))
 }
 
 #[test]

@@ -204,6 +204,62 @@ fn harden(clouds: &mut Clouds, rng: &mut StdRng) {
     }
 }
 
+/// Points from 1e-12 to 1e12 away from the origin, all in one cloud.
+pub fn of_all_scales(rng: &mut StdRng) -> Clouds {
+    let cloud = |rng: &mut StdRng| -> (Vec<[f64; 3]>, Vec<f64>) {
+        let count = rng.random_range(1..=25);
+        let point = |rng: &mut StdRng| {
+            let size = power_of_ten(rng, -12.0, 12.0);
+            [0; 3].map(|_| size * rng.random_range(-1.0..1.0))
+        };
+        (0..count)
+            .map(|_| (point(rng), rng.random_range(0.001..1.0)))
+            .unzip()
+    };
+    let (source, source_masses) = cloud(rng);
+    let (target, target_masses) = cloud(rng);
+    Clouds {
+        kind: "of all scales",
+        source,
+        source_masses,
+        target,
+        target_masses,
+    }
+}
+
+/// Masses of 1e-300, 1e-12 and 1 on both sides, with many light ones next to light ones.
+pub fn light_on_both_sides(rng: &mut StdRng) -> Clouds {
+    let lattice = rng.random_bool(0.5);
+    let cloud = |rng: &mut StdRng| -> (Vec<[f64; 3]>, Vec<f64>) {
+        let count = rng.random_range(2..=30);
+        let heavy = rng.random_range(0..count);
+        (0..count)
+            .map(|k| {
+                let mut axis = || {
+                    let value = rng.random_range(-10.0..10.0_f64);
+                    if lattice {
+                        (value / 7.0).round()
+                    } else {
+                        value
+                    }
+                };
+                let point = [axis(), axis(), axis()];
+                let mass = [1e-300, 1e-12, 1e-12][rng.random_range(0..3)];
+                (point, if k == heavy { 1.0 } else { mass })
+            })
+            .unzip()
+    };
+    let (source, source_masses) = cloud(rng);
+    let (target, target_masses) = cloud(rng);
+    Clouds {
+        kind: "light on both sides",
+        source,
+        source_masses,
+        target,
+        target_masses,
+    }
+}
+
 /// A small problem with as many of a solver's troubles as fit.
 pub fn nasty(rng: &mut StdRng) -> Clouds {
     let most = [2, 6, 14, 40][rng.random_range(0..4)];
