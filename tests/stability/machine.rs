@@ -15,7 +15,6 @@ use carpaint::paint::{
 use carpaint::render::{Scene, Shape, render, texels};
 use carpaint::transport::{Cost, Method, Problem, Workspace, solve};
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 
 fn on_threads<T: Send>(threads: usize, work: impl Fn() -> T + Send + Sync) -> T {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -96,7 +95,7 @@ fn pictures_and_flakes_have_the_same_bits_on_one_two_and_eight_threads() {
     };
     let base = solid(4);
     assert_the_same("flakes of pictures", || {
-        let go_on = |_: usize, _: usize| ControlFlow::Continue(());
+        let go_on = |_: usize, _: usize| ();
         let found =
             simulate_flakes(&base, &recipe, &ClusterSettings::default(), &go_on).expect("flakes");
         (found.flakes, found.clustering, found.warnings)
