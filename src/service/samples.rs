@@ -110,7 +110,7 @@ mod tests {
     }
 
     const GOLDEN: (u32, usize, &str, &str) =
-        (3, 169, "15.9", "2.5016 1.4479 0.5679 0.1028 0.0167 0.0046");
+        (4, 169, "15.9", "2.5016 1.4479 0.5679 0.1028 0.0167 0.0046");
 
     #[tokio::test]
     async fn samples_of_an_earlier_recipe_leave_and_uploads_stay() {
