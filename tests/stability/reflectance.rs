@@ -93,7 +93,9 @@ fn assert_sound(paint: &CarPaint, directions: &[Direction]) {
                     let angles = [t.half.theta_h, t.half.theta_d, t.half.h_z, t.half.h_o];
                     let mut parts = angles.iter().chain(&t.base).chain(&t.flakes);
                     assert!(parts.all(|v| v.is_finite()), "{}: {t:?}", what());
-                    assert!((0.0..=1.0).contains(&t.transmission), "{}: {t:?}", what());
+                    // Two products of two shares, each rounded a few times.
+                    let shares = 0.0..=1.0 + 8.0 * f64::EPSILON;
+                    assert!(shares.contains(&t.transmission), "{}: {t:?}", what());
                     assert!(
                         t.highlight.is_finite() && t.highlight >= 0.0,
                         "{}: {t:?}",
@@ -162,9 +164,9 @@ fn at_grazing_the_model_is_what_sixty_digits_say() {
         let t = reflectance.terms(wi, wo, Chi::Table).expect("above");
         // White's Lab comes back to the seven digits of the matrix; the table is not what is looked at here.
         let f = t.transmission * t.base[0] / reflectance.chi_nodes()[0][0] + t.highlight;
-        // A few roundings each of two cosines, their products, a power and an exponential: 32 EPS. The exponent
-        // x = tan²θh/α² carries 8 EPS of itself, and where the horizontal parts cancel, each of them being rounded by
-        // half an EPS, tan θh moves by EPS/(i_z + o_z). T = 1 − R is rounded at the size of 1: 8 EPS of it.
+        // A few roundings each of two cosines, their products, two T that are not taken as 1 − R, a power and an
+        // exponential: 32 EPS. The exponent x = tan²θh/α² carries 8 EPS of itself, and where the horizontal parts cancel,
+        // each of them being rounded by half an EPS, tan θh moves by EPS/(i_z + o_z).
         let index = ior.max(1.0);
         let (inner_i, inner_o) = (refract(wi, index), refract(wo, index));
         let exponent = |half: carpaint::paint::HalfAngles, alpha: f64, heights: f64| {
@@ -174,15 +176,12 @@ fn at_grazing_the_model_is_what_sixty_digits_say() {
         if roughness > 0.0 {
             roundings += exponent(half_angles(wi, wo), roughness, z_i + z_o);
         }
-        for z in [z_i, z_o] {
-            roundings += 8.0 / (1.0 - fresnel(z, index));
-        }
         let off = (f / want - 1.0).abs();
         worst = worst.max(off / (roundings * eps));
         cases += 1;
         assert!(off <= roundings * eps, "{line}: {f:e}, off by {off:e}");
     }
-    println!("worst of {cases}: {worst} of what was allowed");
+    println!("worst of {cases}: {worst} of what is allowed");
     assert_eq!(cases, 41);
 }
 
