@@ -12,6 +12,7 @@
 
 use serde::Serialize;
 
+use super::gltf_bake::Texels;
 use super::gltf_brdf::{Cosines, GltfMaterial, dielectric_f0};
 use super::gltf_search::{Problem, minimise};
 use crate::color::{Lab, LinearRgb, ciede2000};
@@ -27,15 +28,19 @@ const HUE_TRAVEL_DEG: f64 = 20.0;
 const LACQUER_ALPHA: f64 = 0.1;
 /// Weight of the pairs beside the instrument's.
 const BESIDE: f64 = 0.1;
+/// Largest F0 of a paint with flakes: texels around a mean nearer to 1 could not differ.
+const F0_WITH_FLAKES: f64 = 0.94;
+/// Weight by which the base takes the flop's chromaticity. Under an F0 near 1 it hardly shows, so nothing else decides.
+const BASE_CHROMATICITY: f64 = 0.7;
 
-/// How far a GLB's material is from its paint, textures averaged.
+/// How far a GLB's material is from its paint, as the mean of what a viewer shows of its texels.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LossReport {
     /// Aspecular angles of the geometries, degrees; light at 45°.
     pub aspecular_deg: [f64; 6],
     /// CIEDE2000 between material and paint at each.
     pub delta_e2000: [f64; 6],
-    /// The same with the material averaged over the normals of its texture, as a close view averages.
+    /// The same, averaged over the normals of its texture too, as a close view averages.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delta_e2000_over_normals: Option<[f64; 6]>,
     /// Median of `delta_e2000`.
@@ -154,7 +159,7 @@ pub(super) fn fit(reflectance: &Reflectance<'_>) -> (GltfMaterial, LossReport) {
     let targets = targets(reflectance);
     let mut best = fit_plain(reflectance, &targets);
     if best.merit > GOOD_ENOUGH && hue_travels(&targets) {
-        let film = fit_film(&best, &targets);
+        let film = fit_film(&best, &targets, brightest(reflectance));
         if film.merit < WORTH_A_FILM * best.merit {
             best = film;
         }
@@ -162,24 +167,31 @@ pub(super) fn fit(reflectance: &Reflectance<'_>) -> (GltfMaterial, LossReport) {
     (best.material, loss(&best.material, reflectance, None))
 }
 
-/// CIEDE2000 of a material against a paint; `normals` are those of a texture to average over.
+/// CIEDE2000 of a material against a paint; `texels` are those of its textures, to average over.
 pub(super) fn loss(
     material: &GltfMaterial,
     reflectance: &Reflectance<'_>,
-    normals: Option<&[Direction]>,
+    texels: Option<&Texels>,
 ) -> LossReport {
+    let shown = |(wi, wo): (Direction, Direction)| {
+        let shades = texels.map(|texels| &texels.shades[..]);
+        shades.map_or_else(
+            || material.evaluate(wi, wo),
+            |shades| over_shades(material, wi, wo, shades),
+        )
+    };
     let labs = |pair: (Direction, Direction)| {
         let paint = reflected(reflectance.evaluate(pair.0, pair.1, Chi::Table));
-        (paint, reflected(material.evaluate(pair.0, pair.1)))
+        (paint, reflected(shown(pair)))
     };
     let pairs = instrument_pairs();
     let both = pairs.map(labs);
     let delta_e2000 = both.map(|(paint, material)| ciede2000(paint, material));
-    let delta_e2000_over_normals = normals.map(|normals| {
+    let delta_e2000_over_normals = texels.map(|texels| {
         std::array::from_fn(|k| {
             ciede2000(
                 both[k].0,
-                reflected(over_normals(material, pairs[k], normals)),
+                reflected(over_normals(material, pairs[k], texels)),
             )
         })
     });
@@ -196,16 +208,35 @@ pub(super) fn loss(
     }
 }
 
-/// Mean of a material over tilted normals, seen as one surface.
+/// Mean of a material over the shades of its F0.
+fn over_shades(
+    material: &GltfMaterial,
+    wi: Direction,
+    wo: Direction,
+    shades: &[(f64, LinearRgb)],
+) -> LinearRgb {
+    let mut sum = [0.0; 3];
+    if let Some(cosines) = Cosines::of(wi, wo) {
+        for (share, f0) in shades {
+            let f = material.at_texel(&cosines, *f0);
+            for k in 0..3 {
+                sum[k] += share * f[k];
+            }
+        }
+    }
+    sum
+}
+
+/// Mean of a material over tilted normals and shades of F0, seen as one surface.
 fn over_normals(
     material: &GltfMaterial,
     (wi, wo): (Direction, Direction),
-    normals: &[Direction],
+    Texels { normals, shades }: &Texels,
 ) -> LinearRgb {
     let mut sum = [0.0; 3];
     for normal in normals {
         let [li, lo] = [wi, wo].map(|w| in_frame(*normal, w));
-        let f = material.evaluate(li, lo);
+        let f = over_shades(material, li, lo, shades);
         // A viewer multiplies by the cosine against the tilted normal, the instrument divides by the flat one.
         for k in 0..3 {
             sum[k] += f[k] * li[2].max(0.0) / wi[2];
@@ -230,10 +261,18 @@ struct Candidate {
 
 struct Fitting<'a> {
     targets: &'a [Target],
+    /// Shares of the channels in what the paint shows farthest from the gloss.
+    flop: LinearRgb,
     layout: Layout,
     /// What is not free.
     fixed: GltfMaterial,
     bounds: Vec<(f64, f64)>,
+}
+
+/// Shares of the channels in a color, none of them for black.
+fn chromaticity(color: LinearRgb) -> LinearRgb {
+    let sum: f64 = color.iter().map(|v| v.max(0.0)).sum();
+    color.map(|v| v.max(0.0) / (sum + 1e-6))
 }
 
 /// Which numbers of the material are free beside diffuse, F0 and the lobe's α.
@@ -259,6 +298,8 @@ impl Problem for Fitting<'_> {
                 .difference(t.lab, reflected(material.at(&t.cosines)));
             out.extend(difference.map(|d| d * t.weight.sqrt()));
         }
+        let base = chromaticity(material.base_color);
+        out.extend((0..3).map(|k| BASE_CHROMATICITY * (base[k] - self.flop[k])));
     }
 
     fn bounds(&self) -> &[(f64, f64)] {
@@ -267,8 +308,9 @@ impl Problem for Fitting<'_> {
 }
 
 impl<'a> Fitting<'a> {
-    fn new(targets: &'a [Target], layout: Layout, fixed: GltfMaterial) -> Self {
-        let mut bounds = vec![(0.0, 1.0); 6];
+    fn new(targets: &'a [Target], layout: Layout, fixed: GltfMaterial, brightest: f64) -> Self {
+        let mut bounds = vec![(0.0, 1.0), (0.0, 1.0), (0.0, 1.0)];
+        bounds.extend([(0.0, brightest); 3]);
         let lacquer = fixed.clearcoat_roughness.powi(2);
         match layout {
             Layout::Lobe => bounds.push((0.02, 1.0)),
@@ -278,8 +320,11 @@ impl<'a> Fitting<'a> {
             Layout::SecondLobe => bounds.extend([(0.02, 1.0), (0.0, 1.0), (0.02, 0.8)]),
             Layout::Film => bounds.extend([(0.02, 1.0), (0.0, 1.0), (1.1, 3.0), (100.0, 1200.0)]),
         }
+        // The last of the instrument's geometries.
+        let flop = targets.get(5).map_or([0.0; 3], |t| chromaticity(t.color));
         Self {
             targets,
+            flop,
             layout,
             fixed,
             bounds,
@@ -345,12 +390,21 @@ fn clear_coat(reflectance: &Reflectance<'_>) -> (Layout, GltfMaterial) {
     )
 }
 
+/// Largest F0 that is fitted.
+fn brightest(reflectance: &Reflectance<'_>) -> f64 {
+    if reflectance.paint().flakes.is_some() {
+        F0_WITH_FLAKES
+    } else {
+        1.0
+    }
+}
+
 /// Starts of the lobe's α.
 const ALPHAS: [f64; 5] = [0.08, 0.15, 0.25, 0.4, 0.65];
 
 fn fit_plain(reflectance: &Reflectance<'_>, targets: &[Target]) -> Candidate {
     let (layout, fixed) = clear_coat(reflectance);
-    let problem = Fitting::new(targets, layout, fixed);
+    let problem = Fitting::new(targets, layout, fixed, brightest(reflectance));
     let starts = ALPHAS.iter().map(|&alpha| {
         let rest = match layout {
             Layout::Lacquer => vec![0.7 * fixed.clearcoat_roughness.powi(2)],
@@ -425,10 +479,10 @@ fn best_of(problem: &Fitting<'_>, starts: Vec<Vec<f64>>) -> Candidate {
 /// Thicknesses of the film to start from, nanometres: one to three orders of visible light.
 const THICKNESSES: [f64; 6] = [150.0, 250.0, 350.0, 450.0, 600.0, 800.0];
 
-fn fit_film(plain: &Candidate, targets: &[Target]) -> Candidate {
+fn fit_film(plain: &Candidate, targets: &[Target], brightest: f64) -> Candidate {
     let m = plain.material;
     let f0 = dielectric_f0(m.ior, m.specular_color);
-    let problem = Fitting::new(targets, Layout::Film, m);
+    let problem = Fitting::new(targets, Layout::Film, m, brightest);
     let keep = |v: f64| v.clamp(1e-4, 0.95);
     let starts = THICKNESSES.iter().flat_map(|&thickness| {
         [1.4, 2.0].map(|ior| {
