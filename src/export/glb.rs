@@ -7,11 +7,12 @@
 use serde_json::{Map, Value, json};
 
 use super::gltf_bake::{Baked, bake};
-use super::gltf_brdf::dielectric_f0;
+use super::gltf_brdf::{GltfMaterial, dielectric_f0};
 use super::gltf_fit::{fit, loss};
 use super::gltf_material::{extras, material_json};
 use super::gltf_mesh::{Mesh, ball};
 use super::{About, ExportError};
+use crate::color::LinearRgb;
 use crate::paint::{CarPaint, Flakes, RandomTexture, Reflectance};
 
 /// The GLB of a paint. Its lists are 32-bit, its pictures 8-bit, whatever a bundle's textures would be.
@@ -29,7 +30,8 @@ pub fn glb(paint: &CarPaint, about: &About) -> Result<Vec<u8>, ExportError> {
     if let Some(flakes) = &paint.flakes {
         let f0 = dielectric_f0(material.ior, material.specular_color);
         let made = bake(&reflectance, flakes, &material, f0)?;
-        report = loss(&material, &reflectance, Some(&made.normal_sample));
+        material.base_color = shown_between(&material, f0, &made.texels.shades);
+        report = loss(&material, &reflectance, Some(&made.texels));
         // The texture carries the color from here on; its mean times the factor is what was fitted.
         let white = dielectric_f0(material.ior, [1.0; 3])[0];
         material.specular_color = made.f0_factor.map(|f| f / white);
@@ -65,6 +67,21 @@ pub fn glb(paint: &CarPaint, about: &About) -> Result<Vec<u8>, ExportError> {
             json!([{ "magFilter": 9729, "minFilter": 9987, "wrapS": 10497, "wrapT": 10497 }]);
     }
     Ok(chunks(&serde_json::to_vec(&document)?, &file.body))
+}
+
+/// The base color that shows as much between texels of differing F0 as the fitted one under their mean.
+///
+/// A texel lets through to the base what its strongest channel leaves, and flakes of many colors leave less than their
+/// mean would.
+fn shown_between(material: &GltfMaterial, f0: LinearRgb, shades: &[(f64, LinearRgb)]) -> LinearRgb {
+    let strongest = |f0: LinearRgb| f0[0].max(f0[1]).max(f0[2]);
+    let left: f64 = shades
+        .iter()
+        .map(|(share, f0)| share * (1.0 - strongest(*f0)))
+        .sum();
+    let gain = (1.0 - strongest(f0)) / left.max(1e-6);
+    let most = 1.0 / strongest(material.base_color).max(1e-6);
+    material.base_color.map(|v| v * gain.min(most))
 }
 
 /// Component types of the format.

@@ -2,8 +2,9 @@
 //!
 //! The F0 texture varies the fitted lobe as the flakes vary the paint at 25° off the gloss: brighter flakes are brighter
 //! facets. The normal texture tilts every cell a little, so that facets light up one after the other as the object turns.
-//! The F0 averages to the fitted one exactly, bytes and clamps included; the tilts widen the lobe by a few percent, which
-//! the loss report states. What a viewer shows is a likeness: the statistics themselves travel beside it.
+//! No texel's F0 is above 1, where viewers clamp, and they average to the fitted one, bytes included. The tilts widen the
+//! lobe by a few percent, which the loss report states. What a viewer shows is a likeness: the statistics themselves
+//! travel beside it.
 
 use image::ExtendedColorType;
 
@@ -15,8 +16,6 @@ use crate::paint::{
     Chi, Direction, FlakeSampler, Flakes, RandomTexture, Reflectance, TexelDraw, instrument_pairs,
 };
 
-/// Largest F0 of a texel: beyond it a mirror does not go.
-const BRIGHTEST: f64 = 0.98;
 /// Least brightness of a texel, relative to the mean: measured flakes are noise around zero between glints.
 const DARKEST: f64 = 0.02;
 /// Standard deviation of the facets' slopes, as a share of the lobe's α.
@@ -34,13 +33,52 @@ pub(super) struct Baked {
     pub f0_factor: LinearRgb,
     /// PNG of tangent-space normals.
     pub normals: Vec<u8>,
-    /// Some of the normals, for the loss.
-    pub normal_sample: Vec<Direction>,
+    /// What the loss averages over.
+    pub texels: Texels,
+}
+
+/// The textures as their statistics.
+pub(super) struct Texels {
+    /// Some of the normals.
+    pub normals: Vec<Direction>,
+    /// Shares of the area and the mean F0 in them, by strongest channel and its level.
+    ///
+    /// A lobe without a film is linear in F0 and in its strongest channel, so that these stand for the texels exactly.
+    pub shades: Vec<(f64, LinearRgb)>,
+}
+
+/// Levels of the strongest channel that are told apart; films are not linear in F0.
+const LEVELS: usize = 4;
+
+/// Sums over the facets of each shade.
+#[derive(Default)]
+struct Shades([(f64, LinearRgb); 3 * LEVELS]);
+
+impl Shades {
+    fn add(&mut self, f0: LinearRgb, area: f64) {
+        let strongest = usize::from(f0[1] > f0[0]);
+        let strongest = if f0[2] > f0[strongest] { 2 } else { strongest };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // F0 is 0..=1
+        let level = ((f0[strongest] * LEVELS as f64) as usize).min(LEVELS - 1);
+        let (sum, color) = &mut self.0[strongest * LEVELS + level];
+        *sum += area;
+        for k in 0..3 {
+            color[k] += area * f0[k];
+        }
+    }
+
+    fn shares(&self) -> Vec<(f64, LinearRgb)> {
+        let all: f64 = self.0.iter().map(|(area, _)| area).sum();
+        let seen = self.0.iter().filter(|(area, _)| *area > 0.0);
+        seen.map(|(area, sum)| (area / all, sum.map(|s| s / area)))
+            .collect()
+    }
 }
 
 /// Color and tilt of one cell.
 #[derive(Clone, Copy)]
 struct Facet {
+    /// Relative to the mean.
     f0: [f32; 3],
     normal: [f32; 3],
 }
@@ -56,7 +94,7 @@ pub(super) fn bake(
     let cells = tile.cells();
     let width = tile.width() as usize;
     let baked = BakedSlice::of(reflectance, flakes);
-    let facet = facets(reflectance, &baked, material, f0);
+    let facet = facets(reflectance, &baked, material);
     // Cells are wider than texels: most texels show the facet beside or above, and only its bytes are theirs.
     let mut shown: Vec<u32> = Vec::with_capacity(cells.len());
     let (mut all, mut areas): (Vec<Facet>, Vec<f64>) = (Vec::new(), Vec::new());
@@ -74,6 +112,12 @@ pub(super) fn bake(
         areas[own] += 1.0;
         #[allow(clippy::cast_possible_truncation)] // no more facets than texels of a tile
         shown.push(own as u32);
+    }
+    let gain: [f32; 3] = std::array::from_fn(|k| clamped_gain(&all, &areas, k, f0[k]));
+    for facet in &mut all {
+        for k in 0..3 {
+            facet.f0[k] = (facet.f0[k] * gain[k]).min(1.0);
+        }
     }
     let peak = all.iter().flat_map(|f| f.f0).fold(1e-6_f32, f32::max);
     let curve = SrgbCurve::new();
@@ -96,6 +140,16 @@ pub(super) fn bake(
         .collect();
     #[allow(clippy::cast_precision_loss)] // a tile's texels
     let mean = sum.map(|s| s / shown.len() as f64);
+    let f0_factor: LinearRgb =
+        std::array::from_fn(|k| if mean[k] > 1e-9 { f0[k] / mean[k] } else { 0.0 });
+    let mut shades = Shades::default();
+    for (bytes, area) in colors.iter().zip(&areas) {
+        let light = bytes.map(|b| f64::from(curve.light[usize::from(b)]));
+        shades.add(
+            std::array::from_fn(|k| (light[k] * f0_factor[k]).min(1.0)),
+            *area,
+        );
+    }
     let normal_sample = shown
         .iter()
         .step_by(shown.len().div_ceil(64).max(1))
@@ -113,10 +167,39 @@ pub(super) fn bake(
     };
     Ok(Baked {
         f0: picture(&colors)?,
-        f0_factor: std::array::from_fn(|k| if mean[k] > 1e-9 { f0[k] / mean[k] } else { 0.0 }),
+        f0_factor,
         normals: picture(&normals)?,
-        normal_sample,
+        texels: Texels {
+            normals: normal_sample,
+            shades: shades.shares(),
+        },
     })
+}
+
+/// The gain at which facets, none above 1, have the mean `f0` in a channel.
+///
+/// The mean is concave and piecewise linear in the gain, so Newton's steps from below end on it.
+#[allow(clippy::cast_possible_truncation)] // texel precision
+fn clamped_gain(facets: &[Facet], areas: &[f64], channel: usize, f0: f64) -> f32 {
+    let area: f64 = areas.iter().sum();
+    let mut gain = 0.0;
+    for _ in 0..24 {
+        let (mut below, mut above) = (0.0, 0.0);
+        for (facet, area) in facets.iter().zip(areas) {
+            let relative = f64::from(facet.f0[channel]);
+            if gain * relative < 1.0 {
+                below += area * relative;
+            } else {
+                above += area;
+            }
+        }
+        let next = (f0 * area - above) / below;
+        if !(next.is_finite() && next > gain * (1.0 + 1e-6)) {
+            break;
+        }
+        gain = next;
+    }
+    gain as f32
 }
 
 /// The flakes nearest to the geometry that is baked.
@@ -157,7 +240,6 @@ fn facets<'a>(
     reflectance: &Reflectance<'_>,
     baked: &'a BakedSlice,
     material: &GltfMaterial,
-    f0: LinearRgb,
 ) -> impl Fn(u32) -> Facet + 'a {
     let (wi, wo) = instrument_pairs()[BAKED_GEOMETRY];
     let transmission = reflectance
@@ -178,8 +260,7 @@ fn facets<'a>(
         let color = sampler.color(cell, baked.theta_h_deg, baked.theta_d_deg);
         #[allow(clippy::cast_possible_truncation)] // texel precision
         let f0 = std::array::from_fn(|k| {
-            let relative = (1.0 + gain[k] * (f64::from(color[k]) - mean[k])).max(DARKEST);
-            (f0[k] * relative).min(BRIGHTEST) as f32
+            (1.0 + gain[k] * (f64::from(color[k]) - mean[k])).max(DARKEST) as f32
         });
         Facet {
             f0,
@@ -229,9 +310,11 @@ impl SrgbCurve {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::color::{Lab, ciede2000};
     use crate::export::gltf_brdf::dielectric_f0;
-    use crate::export::gltf_fit::fit;
+    use crate::export::gltf_fit::{fit, loss};
     use crate::export::made_up::metallic;
+    use crate::paint::CarPaint;
 
     #[test]
     fn the_texture_averages_to_the_fitted_f0() {
@@ -258,6 +341,58 @@ mod tests {
         }
         let bytes: std::collections::BTreeSet<u8> = picture.pixels().map(|p| p.0[1]).collect();
         assert!(bytes.len() > 10, "the texture varies");
+    }
+
+    /// Brighter and redder than one lobe can be, so that the mean F0 meets its bound and most texels theirs.
+    fn bright() -> CarPaint {
+        let mut paint = metallic(8, 6, 30);
+        let flakes = paint.flakes.as_mut().expect("flakes");
+        for color in flakes.lower.iter_mut().chain(&mut flakes.upper) {
+            *color = [1.3 * color[0] + 30.0, color[1] + 30.0, color[2] + 20.0];
+        }
+        paint
+    }
+
+    #[test]
+    fn the_loss_is_that_of_all_texels_as_viewers_show_them() {
+        let paint = bright();
+        let reflectance = Reflectance::new(&paint);
+        let (material, _) = fit(&reflectance);
+        let f0 = dielectric_f0(material.ior, material.specular_color);
+        assert!(f0[0] > 0.9, "{f0:?}");
+        let flakes = paint.flakes.as_ref().expect("flakes");
+        let baked = bake(&reflectance, flakes, &material, f0).expect("baked");
+        let picture = image::load_from_memory(&baked.f0).expect("a PNG").to_rgb8();
+        let curve = SrgbCurve::new();
+        let white = dielectric_f0(material.ior, [1.0; 3])[0];
+        for (iridescence, tolerance) in [(0.0, 0.02), (0.7, 0.3)] {
+            let material = GltfMaterial {
+                base_color: [0.2, 0.1, 0.4],
+                iridescence,
+                ..material
+            };
+            let reported = loss(&material, &reflectance, Some(&baked.texels));
+            for (pair, lab) in instrument_pairs().into_iter().zip(reported.material_lab) {
+                let mut sum = [0.0; 3];
+                for pixel in picture.pixels() {
+                    let light = pixel.0.map(|b| f64::from(curve.light[usize::from(b)]));
+                    let texel = GltfMaterial {
+                        specular_color: std::array::from_fn(|k| {
+                            light[k] * baked.f0_factor[k] / white
+                        }),
+                        ..material
+                    };
+                    let f = texel.evaluate(pair.0, pair.1);
+                    for k in 0..3 {
+                        sum[k] += f[k];
+                    }
+                }
+                let texels = f64::from(picture.width() * picture.height());
+                let seen = Lab::from_rgb(sum.map(|s| s / texels * std::f64::consts::PI));
+                let apart = ciede2000(Lab::from(lab), seen);
+                assert!(apart < tolerance, "{iridescence}: {apart}");
+            }
+        }
     }
 
     #[test]

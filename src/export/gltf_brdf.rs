@@ -99,9 +99,13 @@ impl GltfMaterial {
 
     /// BRDF at known cosines.
     pub(super) fn at(&self, c: &Cosines) -> LinearRgb {
+        self.at_texel(c, dielectric_f0(self.ior, self.specular_color))
+    }
+
+    /// BRDF at known cosines where a texel's F0 is `f0`, at most 1.
+    pub(super) fn at_texel(&self, c: &Cosines, f0: LinearRgb) -> LinearRgb {
         let lobe = specular(self.roughness * self.roughness, c);
         let grazing = (1.0 - c.v_h).max(0.0).powi(5);
-        let f0 = dielectric_f0(self.ior, self.specular_color);
         let mut fr = f0.map(|f| self.specular * (f + (1.0 - f) * grazing));
         let mut conductor = self.base_color.map(|f| f + (1.0 - f) * grazing);
         if self.iridescence > 0.0 && self.iridescence_thickness_nm > 0.0 {

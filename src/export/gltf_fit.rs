@@ -19,6 +19,7 @@ use self::loss::reflected;
 use self::targets::{Target, targets};
 use super::gltf_brdf::{GltfMaterial, dielectric_f0};
 use super::gltf_search::{Problem, minimise};
+use crate::color::LinearRgb;
 use crate::paint::Reflectance;
 
 /// Share of the merit by which iridescence must improve it.
@@ -29,6 +30,10 @@ const GOOD_ENOUGH: f64 = 6.0;
 const HUE_TRAVEL_DEG: f64 = 20.0;
 /// Widest lobe that looks like lacquer: a highlight with a visible rim.
 const LACQUER_ALPHA: f64 = 0.1;
+/// Largest F0 of a paint with flakes: texels around a mean nearer to 1 could not differ.
+const F0_WITH_FLAKES: f64 = 0.94;
+/// Weight by which the base takes the flop's chromaticity. Under an F0 near 1 it hardly shows, so nothing else decides.
+const BASE_CHROMATICITY: f64 = 0.7;
 
 /// Whether the instrument sees hues that no single color explains.
 fn hue_travels(targets: &[Target]) -> bool {
@@ -49,7 +54,7 @@ pub(super) fn fit(reflectance: &Reflectance<'_>) -> (GltfMaterial, LossReport) {
     let targets = targets(reflectance);
     let mut best = fit_plain(reflectance, &targets);
     if best.merit > GOOD_ENOUGH && hue_travels(&targets) {
-        let film = fit_film(&best, &targets);
+        let film = fit_film(&best, &targets, brightest(reflectance));
         if film.merit < WORTH_A_FILM * best.merit {
             best = film;
         }
@@ -65,10 +70,18 @@ struct Candidate {
 
 struct Fitting<'a> {
     targets: &'a [Target],
+    /// Shares of the channels in what the paint shows farthest from the gloss.
+    flop: LinearRgb,
     layout: Layout,
     /// What is not free.
     fixed: GltfMaterial,
     bounds: Vec<(f64, f64)>,
+}
+
+/// Shares of the channels in a color, none of them for black.
+fn chromaticity(color: LinearRgb) -> LinearRgb {
+    let sum: f64 = color.iter().map(|v| v.max(0.0)).sum();
+    color.map(|v| v.max(0.0) / (sum + 1e-6))
 }
 
 /// Which numbers of the material are free beside diffuse, F0 and the lobe's α.
@@ -94,6 +107,8 @@ impl Problem for Fitting<'_> {
                 .difference(t.lab, reflected(material.at(&t.cosines)));
             out.extend(difference.map(|d| d * t.weight.sqrt()));
         }
+        let base = chromaticity(material.base_color);
+        out.extend((0..3).map(|k| BASE_CHROMATICITY * (base[k] - self.flop[k])));
     }
 
     fn bounds(&self) -> &[(f64, f64)] {
@@ -102,8 +117,9 @@ impl Problem for Fitting<'_> {
 }
 
 impl<'a> Fitting<'a> {
-    fn new(targets: &'a [Target], layout: Layout, fixed: GltfMaterial) -> Self {
-        let mut bounds = vec![(0.0, 1.0); 6];
+    fn new(targets: &'a [Target], layout: Layout, fixed: GltfMaterial, brightest: f64) -> Self {
+        let mut bounds = vec![(0.0, 1.0), (0.0, 1.0), (0.0, 1.0)];
+        bounds.extend([(0.0, brightest); 3]);
         let lacquer = fixed.clearcoat_roughness.powi(2);
         match layout {
             Layout::Lobe => bounds.push((0.02, 1.0)),
@@ -113,8 +129,11 @@ impl<'a> Fitting<'a> {
             Layout::SecondLobe => bounds.extend([(0.02, 1.0), (0.0, 1.0), (0.02, 0.8)]),
             Layout::Film => bounds.extend([(0.02, 1.0), (0.0, 1.0), (1.1, 3.0), (100.0, 1200.0)]),
         }
+        // The last of the instrument's geometries.
+        let flop = targets.get(5).map_or([0.0; 3], |t| chromaticity(t.color));
         Self {
             targets,
+            flop,
             layout,
             fixed,
             bounds,
@@ -180,12 +199,21 @@ fn clear_coat(reflectance: &Reflectance<'_>) -> (Layout, GltfMaterial) {
     )
 }
 
+/// Largest F0 that is fitted.
+fn brightest(reflectance: &Reflectance<'_>) -> f64 {
+    if reflectance.paint().flakes.is_some() {
+        F0_WITH_FLAKES
+    } else {
+        1.0
+    }
+}
+
 /// Starts of the lobe's α.
 const ALPHAS: [f64; 5] = [0.08, 0.15, 0.25, 0.4, 0.65];
 
 fn fit_plain(reflectance: &Reflectance<'_>, targets: &[Target]) -> Candidate {
     let (layout, fixed) = clear_coat(reflectance);
-    let problem = Fitting::new(targets, layout, fixed);
+    let problem = Fitting::new(targets, layout, fixed, brightest(reflectance));
     let starts = ALPHAS.iter().map(|&alpha| {
         let rest = match layout {
             Layout::Lacquer => vec![0.7 * fixed.clearcoat_roughness.powi(2)],
@@ -260,10 +288,10 @@ fn best_of(problem: &Fitting<'_>, starts: Vec<Vec<f64>>) -> Candidate {
 /// Thicknesses of the film to start from, nanometres: one to three orders of visible light.
 const THICKNESSES: [f64; 6] = [150.0, 250.0, 350.0, 450.0, 600.0, 800.0];
 
-fn fit_film(plain: &Candidate, targets: &[Target]) -> Candidate {
+fn fit_film(plain: &Candidate, targets: &[Target], brightest: f64) -> Candidate {
     let m = plain.material;
     let f0 = dielectric_f0(m.ior, m.specular_color);
-    let problem = Fitting::new(targets, Layout::Film, m);
+    let problem = Fitting::new(targets, Layout::Film, m, brightest);
     let keep = |v: f64| v.clamp(1e-4, 0.95);
     let starts = THICKNESSES.iter().flat_map(|&thickness| {
         [1.4, 2.0].map(|ior| {

@@ -3,17 +3,18 @@
 use serde::Serialize;
 
 use crate::color::{Lab, LinearRgb, ciede2000};
-use crate::export::gltf_brdf::GltfMaterial;
+use crate::export::gltf_bake::Texels;
+use crate::export::gltf_brdf::{Cosines, GltfMaterial};
 use crate::paint::{ASPECULAR_DEG, Chi, Direction, Reflectance, instrument_pairs};
 
-/// How far a GLB's material is from its paint, textures averaged.
+/// How far a GLB's material is from its paint, as the mean of what a viewer shows of its texels.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LossReport {
     /// Aspecular angles of the geometries, degrees; light at 45°.
     pub aspecular_deg: [f64; 6],
     /// CIEDE2000 between material and paint at each.
     pub delta_e2000: [f64; 6],
-    /// The same with the material averaged over the normals of its texture, as a close view averages.
+    /// The same, averaged over the normals of its texture too, as a close view averages.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delta_e2000_over_normals: Option<[f64; 6]>,
     /// Median of `delta_e2000`.
@@ -26,24 +27,31 @@ pub struct LossReport {
     pub material_lab: [[f64; 3]; 6],
 }
 
-/// CIEDE2000 of a material against a paint; `normals` are those of a texture to average over.
+/// CIEDE2000 of a material against a paint; `texels` are those of its textures, to average over.
 pub(in crate::export) fn loss(
     material: &GltfMaterial,
     reflectance: &Reflectance<'_>,
-    normals: Option<&[Direction]>,
+    texels: Option<&Texels>,
 ) -> LossReport {
+    let shown = |(wi, wo): (Direction, Direction)| {
+        let shades = texels.map(|texels| &texels.shades[..]);
+        shades.map_or_else(
+            || material.evaluate(wi, wo),
+            |shades| over_shades(material, wi, wo, shades),
+        )
+    };
     let labs = |pair: (Direction, Direction)| {
         let paint = reflected(reflectance.evaluate(pair.0, pair.1, Chi::Table));
-        (paint, reflected(material.evaluate(pair.0, pair.1)))
+        (paint, reflected(shown(pair)))
     };
     let pairs = instrument_pairs();
     let both = pairs.map(labs);
     let delta_e2000 = both.map(|(paint, material)| ciede2000(paint, material));
-    let delta_e2000_over_normals = normals.map(|normals| {
+    let delta_e2000_over_normals = texels.map(|texels| {
         std::array::from_fn(|k| {
             ciede2000(
                 both[k].0,
-                reflected(over_normals(material, pairs[k], normals)),
+                reflected(over_normals(material, pairs[k], texels)),
             )
         })
     });
@@ -60,16 +68,35 @@ pub(in crate::export) fn loss(
     }
 }
 
-/// Mean of a material over tilted normals, seen as one surface.
+/// Mean of a material over the shades of its F0.
+fn over_shades(
+    material: &GltfMaterial,
+    wi: Direction,
+    wo: Direction,
+    shades: &[(f64, LinearRgb)],
+) -> LinearRgb {
+    let mut sum = [0.0; 3];
+    if let Some(cosines) = Cosines::of(wi, wo) {
+        for (share, f0) in shades {
+            let f = material.at_texel(&cosines, *f0);
+            for k in 0..3 {
+                sum[k] += share * f[k];
+            }
+        }
+    }
+    sum
+}
+
+/// Mean of a material over tilted normals and shades of F0, seen as one surface.
 fn over_normals(
     material: &GltfMaterial,
     (wi, wo): (Direction, Direction),
-    normals: &[Direction],
+    Texels { normals, shades }: &Texels,
 ) -> LinearRgb {
     let mut sum = [0.0; 3];
     for normal in normals {
         let [li, lo] = [wi, wo].map(|w| in_frame(*normal, w));
-        let f = material.evaluate(li, lo);
+        let f = over_shades(material, li, lo, shades);
         // A viewer multiplies by the cosine against the tilted normal, the instrument divides by the flat one.
         for k in 0..3 {
             sum[k] += f[k] * li[2].max(0.0) / wi[2];

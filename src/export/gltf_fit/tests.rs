@@ -161,7 +161,7 @@ fn a_film_that_hardly_helps_is_left_out_though_the_hue_travels() {
     let targets = targets(&reflectance);
     assert!(hue_travels(&targets));
     let plain = fit_plain(&reflectance, &targets);
-    let film = fit_film(&plain, &targets);
+    let film = fit_film(&plain, &targets, 1.0);
     assert!(
         plain.merit > GOOD_ENOUGH && film.merit < plain.merit,
         "a film was worth a try: {} to {}",
