@@ -63,9 +63,10 @@ fn every_interval_of_numbers_covers_its_share_of_the_tile() {
 
 #[test]
 fn a_tile_keeps_the_shares_of_its_picks_at_every_angle() {
-    // Four groups of epochs meet at an angle. In each a share is cut out of the ranks at up to 11 pairs of ends, each of
-    // which misses by an even part of a cell, 1/12 of a squared area; and a group's phases thin the n cells of the share
-    // evenly by number, so that only the scatter of their areas stays. Cells dealt by chance would scatter twice as far.
+    // Four groups of epochs meet at an angle. In each a share is cut out of the ranks in up to 11 runs, each end of which
+    // misses by an even part of a cell, 1/12 of a squared area. A group's phases thin a run evenly by number, off by the
+    // rounding at its two ends, 1/6 of a cell squared; and where the n cells of the share are divided by number, the
+    // scatter of their areas stays. Cells dealt by chance would scatter twice as far.
     let tile = RandomTexture::new(256, 256, 3.0, 1);
     let mut areas = std::collections::HashMap::new();
     for cell in tile.cells() {
@@ -85,7 +86,8 @@ fn a_tile_keeps_the_shares_of_its_picks_at_every_angle() {
         });
         let off = (squares.sum::<f64>() / angles.len() as f64).sqrt();
         let cells = count * f64::from(share);
-        let argued = (4.0 * 2.0 * 11.0 / 12.0 * square + 0.75 * cells * (square - 1.0)).sqrt();
+        let argued =
+            (4.0 * 11.0 / 6.0 * square + 4.0 * 11.0 / 6.0 + 0.75 * cells * (square - 1.0)).sqrt();
         assert!(off < argued, "{share}: {off} cells, not {argued}");
     }
 }
