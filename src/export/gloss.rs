@@ -104,12 +104,12 @@ mod tests {
         }
     }
 
-    fn coat(ior: f64, roughness: f64) -> Option<Coat> {
-        let smooth = Coat::smooth(ior);
-        Some(Coat {
+    fn rough(ior: f64, roughness: f64) -> CarPaint {
+        let coat = Coat {
             roughness,
-            ..smooth
-        })
+            ..Coat::smooth(ior)
+        };
+        paint(0.0, Some(coat))
     }
 
     #[test]
@@ -130,7 +130,7 @@ mod tests {
             (0.0610, 30.0),
             (0.1362, 10.0),
         ] {
-            let read = gloss(&paint(0.0, coat(1.5, roughness))).at_60;
+            let read = gloss(&rough(1.5, roughness)).at_60;
             assert!((read - want).abs() < 0.15, "{roughness}: {read}");
         }
     }
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn gloss_falls_with_roughness_and_does_not_jump_where_a_mirror_ends() {
-        let at = |roughness| gloss(&paint(0.0, coat(1.5, roughness)));
+        let at = |roughness| gloss(&rough(1.5, roughness));
         let (mirror, narrow) = (at(0.0009), at(0.0011));
         for (a, b) in [
             (mirror.at_20, narrow.at_20),

@@ -100,11 +100,9 @@ async fn read_and_note(app: &App, paint: NotedPaint) -> Result<(), Problem> {
         let file = PaintFile::from_bytes(&bytes, &limits).map_err(Problem::internal)?;
         read(&*works, &Thing::Paint(Box::new(file)))
     });
-    match read.await? {
-        Ok(numbers) => note(app, paint.paint, &numbers).await,
-        Err(_) => {
-            tracing::error!(paint = paint.id, "a paint on record cannot be read");
-            Ok(())
-        }
+    if let Ok(numbers) = read.await? {
+        return note(app, paint.paint, &numbers).await;
     }
+    tracing::error!(paint = paint.id, "a paint on record cannot be read");
+    Ok(())
 }

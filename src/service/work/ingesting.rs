@@ -49,7 +49,7 @@ impl IngestRequest {
 const PAUSES: [Duration; 3] = [
     Duration::from_millis(500),
     Duration::from_secs(5),
-    Duration::from_secs(60),
+    Duration::from_mins(1),
 ];
 
 /// Why a try came to nothing.

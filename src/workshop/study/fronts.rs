@@ -97,7 +97,7 @@ fn even(paints: usize) -> RealisationWeights {
 }
 
 /// The error of what a study clustered itself is known.
-fn measured(error: ResultError) -> Result<f64, WorkshopError> {
+fn measured(error: &ResultError) -> Result<f64, WorkshopError> {
     let unknown =
         || WorkshopError::internal("a paint of the study was not compared with its pictures");
     error.lab.ok_or_else(unknown)

@@ -101,7 +101,7 @@ pub(in crate::workshop::study) fn blend(
             }
             made => made?,
         };
-        let mut point = point(of, seconds, measured(blend_error(&made.blend))?);
+        let mut point = point(of, seconds, measured(&blend_error(&made.blend))?);
         let report = made.blend.report();
         let gap = report.pairs.iter().map(|p| p.mean_gap).fold(0.0, f64::max);
         point.more.insert("of it transport".to_owned(), gap);

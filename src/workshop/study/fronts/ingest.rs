@@ -39,10 +39,10 @@ pub(in crate::workshop::study) fn ingest(
         tell("ingest", share(k, count, 0.0, 0.25));
         let source = &material.sources()[0];
         let (seconds, paint) = shortest(goes, all(), || source.fit(&of.profile.flakes))?;
-        let mut worst = measured(paint_error(&paint))?;
+        let mut worst = measured(&paint_error(&paint))?;
         let mut instrument: f64 = 0.0;
         for file in material.fitted(&of.profile.flakes, 2)? {
-            worst = worst.max(measured(paint_error(file))?);
+            worst = worst.max(measured(&paint_error(file))?);
             let error = file.clustering.as_ref().and_then(|c| c.error.as_ref());
             let largest = error.map_or(0.0, |e| e.instrument.iter().copied().fold(0.0, f64::max));
             instrument = instrument.max(largest);
