@@ -76,14 +76,15 @@ fn bucket(x: f64, y: f64) -> (usize, usize) {
 }
 
 impl Neighbours {
-    fn new(samples: &[Sample]) -> Self {
+    /// `least` is the light below which logarithms stop falling.
+    fn new(samples: &[Sample], least: f64) -> Self {
         let mut buckets = vec![Vec::new(); ROWS * COLUMNS];
         let mut points = Vec::with_capacity(samples.len());
         for (k, sample) in samples.iter().enumerate() {
             let (x, y) = scaled(sample);
             let (r, c) = bucket(x, y);
             buckets[r * COLUMNS + c].push(u32::try_from(k).unwrap_or(u32::MAX));
-            points.push((x, y, sample.rgb.map(|v| v.max(1e-6).ln())));
+            points.push((x, y, sample.rgb.map(|v| v.max(least).ln())));
         }
         Self { points, buckets }
     }
@@ -158,7 +159,7 @@ impl Judge {
     pub fn new(measured: &dyn MeasuredBrdf, frame: Frame, cone_deg: f64, unit: f64) -> Self {
         let samples = measure(measured, SAMPLES, cone_deg, 0x0F10_0A5E);
         let (train, test) = samples.split_at(samples.len() * 4 / 5);
-        let neighbours = Neighbours::new(train);
+        let neighbours = Neighbours::new(train, 1e-3 * DARK * unit);
         let test = test
             .par_iter()
             .map(|s| {
