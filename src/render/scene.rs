@@ -80,9 +80,13 @@ impl Scene {
             lights: vec![DirectionalLight::key(shape)],
             environment: Environment::studio(),
             background: Background::Sweep,
-            camera: Camera::of(shape),
-            // Most of a panel shows its face at once.
-            exposure: if shape == Shape::Panel { 0.75 } else { 1.0 },
+            camera: Camera::of(shape).framing(shape, size),
+            // A ball shows its face in one place, a capsule along its side, a panel all over.
+            exposure: match shape {
+                Shape::Sphere => 1.08,
+                Shape::Capsule => 0.93,
+                Shape::Panel => 0.88,
+            },
             seed: 1,
         }
     }
@@ -174,17 +178,22 @@ impl Scene {
 }
 
 impl DirectionalLight {
-    /// The usual key light of a shape. A panel is lit more from the side: all of it would be face otherwise.
+    /// The usual key light of a shape, inside the studio's. A panel is lit from the side: all of it would be face
+    /// otherwise.
     #[must_use]
     pub const fn key(shape: Shape) -> Self {
         match shape {
-            Shape::Sphere | Shape::Capsule => Self {
-                towards: [-0.35, 0.75, 0.70],
-                irradiance: [0.75; 3],
+            Shape::Sphere => Self {
+                towards: [-0.42, 0.50, 1.0],
+                irradiance: [0.22; 3],
+            },
+            Shape::Capsule => Self {
+                towards: [-0.36, 0.95, 0.90],
+                irradiance: [0.22; 3],
             },
             Shape::Panel => Self {
-                towards: [-0.85, 0.60, 0.45],
-                irradiance: [0.60; 3],
+                towards: [-0.95, 0.60, 0.45],
+                irradiance: [0.80; 3],
             },
         }
     }
@@ -202,14 +211,31 @@ impl Camera {
             },
             Shape::Capsule => Self {
                 origin: [-0.7, 1.9, 6.6],
-                target: [0.0, -0.50, 0.0],
-                field_of_view_deg: 18.0,
+                target: [0.0, -0.53, 0.0],
+                field_of_view_deg: 14.5,
             },
             Shape::Panel => Self {
-                origin: [-0.55, 0.55, 3.9],
-                target: [0.0, -0.40, 0.0],
-                field_of_view_deg: 33.0,
+                origin: [-0.45, 0.45, 2.8],
+                target: [0.0, -0.44, 0.0],
+                field_of_view_deg: 43.0,
             },
+        }
+    }
+
+    /// The camera, nearer where a picture has room above and below its shape: a capsule fills a square only across.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)] // picture sizes
+    pub fn framing(self, shape: Shape, [width, height]: [u32; 2]) -> Self {
+        let tall = match shape {
+            Shape::Sphere => 1.0,
+            Shape::Capsule => 0.68,
+            Shape::Panel => 0.84,
+        };
+        let share = (height as f32 / width.max(1) as f32).clamp(tall, 1.0);
+        let tangent = (self.field_of_view_deg.to_radians() / 2.0).tan();
+        Self {
+            field_of_view_deg: 2.0 * (tangent * share).atan().to_degrees(),
+            ..self
         }
     }
 }

@@ -2,8 +2,12 @@
 //!
 //! Everything is analytic, so the coat's mirror image stays sharp at any picture size. Lights are rectangles at
 //! infinity in their own tangent plane, with a soft border; the rest is a dim gradient over a mid-grey floor. Colors
-//! are neutral: a studio must not tint what it shows. Radiance is in units in which a white diffuser facing the camera
-//! comes out near 0.8.
+//! are neutral: a studio must not tint what it shows.
+//!
+//! Most light is broad and comes from the camera's side, to the left: the face lies there, and what turns away to the
+//! right and downwards is seen far from the gloss, in dim surroundings, so that a paint shows its travel. Radiance is in
+//! units in which a white diffuser facing the camera comes out near 0.7: the face of a silver is twice as bright, and
+//! must not burn out.
 
 use super::vector::{Vec3, cross, dot, scale, smoothstep, unit};
 
@@ -28,20 +32,21 @@ pub(super) struct Studio {
     boxes: Vec<SoftBox>,
 }
 
-/// Radiance of the floor far from the object.
-const FLOOR: f32 = 0.26;
+/// Radiance of the floor far from the object, towards the camera.
+const FLOOR: f32 = 0.25;
 
 impl Studio {
     pub(super) fn new() -> Self {
         let boxes = vec![
-            // The long overhead box: the highlight that runs over a roof.
-            soft_box([-0.10, 1.0, 0.62], 0.0, [0.72, 0.075], 0.015, 12.0, 0.2),
-            // A tall strip on the left and a wider, dimmer one on the right.
-            soft_box([-1.0, 0.22, 0.45], 90.0, [0.62, 0.05], 0.012, 14.0, 0.2),
-            soft_box([1.0, 0.30, 0.10], 90.0, [0.60, 0.11], 0.03, 5.0, 0.3),
+            // The key: a wide cloth beside the camera.
+            soft_box([-0.44, 0.36, 1.0], 0.0, [0.74, 0.38], 0.05, 1.65, 0.3),
+            // A long strip overhead, the highlight that runs over a roof, and a tall one on the right. Mirror images of
+            // lights stay clear of each other on a ball.
+            soft_box([0.16, 1.0, 0.30], 0.0, [0.80, 0.055], 0.012, 8.0, 0.2),
+            soft_box([1.0, 0.10, 0.22], 90.0, [0.46, 0.05], 0.012, 7.0, 0.2),
             // Rim lights behind the object.
-            soft_box([-0.85, 0.25, -1.0], 90.0, [0.60, 0.05], 0.03, 6.0, 0.2),
-            soft_box([0.95, 0.40, -1.0], 90.0, [0.60, 0.06], 0.03, 6.0, 0.2),
+            soft_box([-0.85, 0.25, -1.0], 90.0, [0.60, 0.04], 0.02, 6.0, 0.2),
+            soft_box([0.95, 0.40, -1.0], 90.0, [0.60, 0.04], 0.02, 6.0, 0.2),
         ];
         Self { boxes }
     }
@@ -109,21 +114,39 @@ impl SoftBox {
 fn surround(direction: Vec3) -> f32 {
     let y = direction[1];
     let front = 0.5 + 0.5 * direction[2];
-    let wall = 0.03 + (0.06 + 0.18 * front) * (-2.2 * y.max(0.0)).exp() + 0.05 * front;
-    let floor = FLOOR * (0.75 + 0.25 * (1.0 + y.min(0.0)));
+    let wall = 0.014 + (0.03 + 0.27 * front) * (-1.2 * y.max(0.0)).exp() + 0.03 * front;
+    let floor = FLOOR * (0.4 + 0.6 * front) * (0.75 + 0.25 * (1.0 + y.min(0.0)));
     wall + (floor - wall) * smoothstep(0.03, -0.03, y)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::vector::along;
 
     #[test]
     fn the_studio_is_neutral_and_bright_overhead() {
         let studio = Studio::new();
-        let up = studio.radiance(unit([-0.10, 1.0, 0.62]));
+        let up = studio.radiance(unit([0.16, 1.0, 0.30]));
         assert_eq!(up[0], up[1]);
-        assert!(up[0] > 8.0);
+        assert!(up[0] > 6.0);
         assert!(studio.radiance([0.0, 0.0, -1.0])[0] < 1.0);
+    }
+
+    #[test]
+    fn no_light_touches_another() {
+        let boxes = Studio::new().boxes;
+        let steps = || (-20..=20).map(|k: i8| f32::from(k) / 20.0);
+        for (k, lamp) in boxes.iter().enumerate() {
+            // The box widened by 0.08 radians, a twenty-fifth of a ball's radius in its mirror image.
+            let half = lamp.half.map(|half| half + lamp.border + 0.08);
+            for (u, v) in steps().flat_map(|u| steps().map(move |v| (u, v))) {
+                let place = along(lamp.center, lamp.across, u * half[0]);
+                let direction = unit(along(place, lamp.upwards, v * half[1]));
+                for (other, beside) in boxes.iter().enumerate() {
+                    assert!(k == other || beside.seen(direction).0 == 0.0, "{k} {other}");
+                }
+            }
+        }
     }
 }

@@ -69,8 +69,9 @@ impl Surface {
                 }
             }
             Shape::Panel => {
-                let lean = 30.0_f32.to_radians();
-                let (right, up) = (unit([1.0, 0.0, -0.06]), [0.0, lean.cos(), 0.0]);
+                // Turned from the key light: face at one side, and travel across.
+                let lean = 24.0_f32.to_radians();
+                let (right, up) = (unit([1.0, 0.0, -0.22]), [0.0, lean.cos(), 0.0]);
                 let back = cross(right, [0.0, 1.0, 0.0]);
                 let up = unit(along(up, back, -lean.sin()));
                 let half = [0.98, 0.72];
