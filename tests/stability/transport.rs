@@ -43,8 +43,8 @@ fn fuzzed() -> usize {
     }
 }
 
-/// What `good_lp` failed on when this was written, of 900 and 900 slices and of the 2,000 random problems: a silent oracle
-/// proves nothing, so that one that falls silent is told from one that agrees. (With a fifth more: still none.)
+/// What `good_lp` fails on, of 900 and 900 slices and of the 2,000 random problems: a silent oracle proves nothing, so
+/// that one that falls silent is told from one that agrees.
 const KNOWN_FAILURES: usize = 0;
 
 /// Judges slices of paints by certificate and by `good_lp`; returns how often the latter failed.
