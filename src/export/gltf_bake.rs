@@ -55,11 +55,11 @@ const LEVELS: usize = 4;
 struct Shades([(f64, LinearRgb); 3 * LEVELS]);
 
 impl Shades {
-    fn add(&mut self, f0: LinearRgb, area: f64) {
+    fn add(&mut self, f0: LinearRgb, area: f64, levels: usize) {
         let strongest = usize::from(f0[1] > f0[0]);
         let strongest = if f0[2] > f0[strongest] { 2 } else { strongest };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // F0 is 0..=1
-        let level = ((f0[strongest] * LEVELS as f64) as usize).min(LEVELS - 1);
+        let level = ((f0[strongest] * levels as f64) as usize).min(levels - 1);
         let (sum, color) = &mut self.0[strongest * LEVELS + level];
         *sum += area;
         for k in 0..3 {
@@ -142,12 +142,18 @@ pub(super) fn bake(
     let mean = sum.map(|s| s / shown.len() as f64);
     let f0_factor: LinearRgb =
         std::array::from_fn(|k| if mean[k] > 1e-9 { f0[k] / mean[k] } else { 0.0 });
+    let levels = if material.iridescence > 0.0 {
+        LEVELS
+    } else {
+        1
+    };
     let mut shades = Shades::default();
     for (bytes, area) in colors.iter().zip(&areas) {
         let light = bytes.map(|b| f64::from(curve.light[usize::from(b)]));
         shades.add(
             std::array::from_fn(|k| (light[k] * f0_factor[k]).min(1.0)),
             *area,
+            levels,
         );
     }
     let normal_sample = shown
@@ -176,19 +182,31 @@ pub(super) fn bake(
     })
 }
 
-/// The gain at which facets, none above 1, have the mean `f0` in a channel.
+/// Bins of [`clamped_gain`], 64 to the octave, and the first of them: above 2⁻⁶ as the leading bits of a float.
+const BINS: usize = 1024;
+const FIRST_BIN: u32 = 0x3c80_0000 >> 17;
+
+/// The gain at which facets, none above 1, have the mean `f0` in a channel, within a thousandth.
 ///
 /// The mean is concave and piecewise linear in the gain, so Newton's steps from below end on it.
 #[allow(clippy::cast_possible_truncation)] // texel precision
 fn clamped_gain(facets: &[Facet], areas: &[f64], channel: usize, f0: f64) -> f32 {
-    let area: f64 = areas.iter().sum();
+    // Area, and relative F0 times it: steps over bins, not over all facets.
+    let mut bins = vec![(0.0, 0.0); BINS];
+    for (facet, area) in facets.iter().zip(areas) {
+        let relative = facet.f0[channel];
+        let bin = (relative.to_bits() >> 17).saturating_sub(FIRST_BIN) as usize;
+        let (sum, light) = &mut bins[bin.min(BINS - 1)];
+        *sum += area;
+        *light += area * f64::from(relative);
+    }
+    let area: f64 = bins.iter().map(|(area, _)| area).sum();
     let mut gain = 0.0;
     for _ in 0..24 {
         let (mut below, mut above) = (0.0, 0.0);
-        for (facet, area) in facets.iter().zip(areas) {
-            let relative = f64::from(facet.f0[channel]);
-            if gain * relative < 1.0 {
-                below += area * relative;
+        for (area, light) in &bins {
+            if gain * light < *area {
+                below += light;
             } else {
                 above += area;
             }
@@ -361,8 +379,6 @@ mod tests {
         let f0 = dielectric_f0(material.ior, material.specular_color);
         assert!(f0[0] > 0.9, "{f0:?}");
         let flakes = paint.flakes.as_ref().expect("flakes");
-        let baked = bake(&reflectance, flakes, &material, f0).expect("baked");
-        let picture = image::load_from_memory(&baked.f0).expect("a PNG").to_rgb8();
         let curve = SrgbCurve::new();
         let white = dielectric_f0(material.ior, [1.0; 3])[0];
         for (iridescence, tolerance) in [(0.0, 0.02), (0.7, 0.3)] {
@@ -371,6 +387,8 @@ mod tests {
                 iridescence,
                 ..material
             };
+            let baked = bake(&reflectance, flakes, &material, f0).expect("baked");
+            let picture = image::load_from_memory(&baked.f0).expect("a PNG").to_rgb8();
             let reported = loss(&material, &reflectance, Some(&baked.texels));
             for (pair, lab) in instrument_pairs().into_iter().zip(reported.material_lab) {
                 let mut sum = [0.0; 3];

@@ -212,7 +212,7 @@ impl Camera {
             Shape::Capsule => Self {
                 origin: [-0.7, 1.9, 6.6],
                 target: [0.0, -0.53, 0.0],
-                field_of_view_deg: 16.8,
+                field_of_view_deg: 18.0,
             },
             Shape::Panel => Self {
                 origin: [-0.45, 0.45, 2.8],
