@@ -30,11 +30,11 @@ cp .cargo/mutants.toml "$crate/.cargo/"
     mkdir -p "$crate/src/suite/$suite"
     cp "tests/stability/$suite.rs" "$crate/src/suite/$suite/mod.rs"
     if [ -d "tests/stability/$suite" ]; then cp -r "tests/stability/$suite/." "$crate/src/suite/$suite/"; fi
+    # Tables that tests read stand where the tests look for them: beside the suite, and where unit tests see it.
+    cp tests/stability/*.txt "$crate/src/suite/$suite/"
     echo "#[cfg(test)] #[path = \"suite/$suite/mod.rs\"] mod suite_$suite;"
   done
-  # Tables that tests read stand where the tests look for them: beside the suite, and where unit tests see it.
   mkdir -p "$crate/tests/stability"
-  cp tests/stability/*.txt "$crate/src/suite/color/"
   cp tests/stability/*.txt "$crate/tests/stability/"
 } > "$crate/src/lib.rs"
 
