@@ -12,7 +12,6 @@ use std::sync::OnceLock;
 
 use super::environment::{Environment, luminance};
 use super::light_grid::{Grid, HEIGHT, WIDTH};
-use super::points::hash;
 use super::vector::{Vec3, dot, scale, unit};
 
 /// One drawn direction.
@@ -104,17 +103,7 @@ impl<'a> LightTable<'a> {
         self.facings[facing].get_or_init(make)
     }
 
-    /// What a pixel adds to its normals before it looks up their facing: up to half a cell.
-    ///
-    /// Each facing's set of directions leaves a little noise of its own. Pixels that change over one by one hide where
-    /// facings meet; all samples of a pixel lean alike, so that they stay one even set.
-    pub(super) fn lean(x: u32, y: u32, seed: u32) -> Vec3 {
-        let pixel = hash(x ^ hash(y ^ hash(seed)));
-        let half = 1.0 / EDGE as f32;
-        [0, 10, 20].map(|shift| half * ((pixel >> shift & 1023) as f32 / 511.5 - 1.0))
-    }
-
-    /// Number of the facing of a normal, of any length.
+    /// Number of the facing of a unit normal.
     pub(super) fn facing(n: Vec3) -> usize {
         let size = n.map(f32::abs);
         let axis = if size[0] >= size[1] && size[0] >= size[2] {

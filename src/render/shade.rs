@@ -164,7 +164,6 @@ impl<'a> Shader<'a> {
     fn pixel_of<const COATED: bool, const FLAKES: bool>(&self, x: u32, y: u32, seed: u32) -> Vec3 {
         let count = self.scene.samples_per_pixel;
         let points = Points::of_pixel(x, y, count, seed);
-        let lean = LightTable::lean(x, y, seed);
         let origin = self.scene.camera.origin;
         let mut sum = [0.0; 3];
         let mut batch = Batch::new();
@@ -179,7 +178,7 @@ impl<'a> Shader<'a> {
                         self.cell::<FLAKES>(&hit),
                     );
                     if batch.count == WIDTH {
-                        sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points, lean));
+                        sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points));
                         batch.count = 0;
                     }
                 }
@@ -187,7 +186,7 @@ impl<'a> Shader<'a> {
             }
         }
         if batch.count > 0 {
-            sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points, lean));
+            sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points));
         }
         #[allow(clippy::cast_precision_loss)] // a few thousand
         scale(sum, 1.0 / count as f32).map(|v| v.max(0.0))
@@ -210,7 +209,6 @@ impl<'a> Shader<'a> {
         &self,
         batch: &Batch,
         points: Points,
-        lean: Vec3,
     ) -> Vec3 {
         let view = self.kernel.view::<COATED>(batch.local(batch.eye));
         let texels = if FLAKES {
@@ -242,7 +240,7 @@ impl<'a> Shader<'a> {
             #[allow(clippy::cast_precision_loss)] // a few
             let count_f = count as f32;
             let facing: [usize; WIDTH] =
-                std::array::from_fn(|k| LightTable::facing(add(get(&batch.normal, k), lean)));
+                std::array::from_fn(|k| LightTable::facing(get(&batch.normal, k)));
             // One of the directions carries the flakes' deviations for all of them; the others see the mean.
             let many = FLAKES.then(|| {
                 let extent = Lanes(facing.map(|k| table.extent(k)));
