@@ -32,8 +32,8 @@ pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use work::{
     Asked, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Picked, Picture,
-    PictureFormat, Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
-    Workshop,
+    PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing, View, WorkError,
+    Works, Workshop,
 };
 
 use std::path::PathBuf;

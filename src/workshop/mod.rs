@@ -35,7 +35,7 @@ pub use ingest::{
     ingest_in_stages, ingest_upload, is_paint_file, open_measurement,
 };
 pub use previewing::{
-    Light, MOST_SAMPLES, PictureFormat, PreviewOptions, preview, read_environment, texels,
+    Light, MOST_SAMPLES, PictureFormat, PreviewOptions, Show, preview, read_environment, texels,
 };
 pub use reading::{MOST_ANGLES, color_difference, gloss, readings};
 pub use realising::{Format, Made, realise};

@@ -8,11 +8,12 @@ use utoipa::{IntoParams, ToSchema};
 
 use super::profile::ProfileText;
 use super::targets;
+use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::http::{Place, Problem};
 use crate::service::shelf::Shelved;
-use crate::service::work::{Asked, Light, Picked, PictureFormat, Shape, View, WorkError};
+use crate::service::work::{Asked, Light, Picked, PictureFormat, Shape, Show, View, WorkError};
 use crate::workshop::MOST_SAMPLES;
 
 /// Longest side of a picture.
@@ -27,6 +28,9 @@ const MOST_LIGHTS: usize = 16;
 pub struct ViewQuery {
     /// What the paint is on, `sphere` unless given.
     scene: Option<Shape>,
+    /// What is shown on it, `paint` unless given. `aspecular` is the angle between view and mirrored main light in place of
+    /// the paint, the same for every paint and weights; it takes neither `spp`, `profile`, `max_error` nor `max_seconds`.
+    show: Option<Show>,
     /// Width and height in pixels, `512x512` unless given.
     #[param(value_type = Option<String>, pattern = "^[0-9]{1,4}x[0-9]{1,4}$", example = "512x512")]
     size: Option<Size>,
@@ -96,10 +100,12 @@ impl ViewQuery {
                         .accepting("3 numbers, the direction towards the light")
                 })
         });
+        let show = self.show.unwrap_or_default();
         let asked = View {
+            show,
             scene: self.scene.unwrap_or_default(),
             size,
-            samples_per_pixel: spp.unwrap_or(profile.samples_per_pixel),
+            samples_per_pixel: samples(show, spp, &profile),
             lights: light.transpose()?.map(|light| vec![light]),
         };
         view(app, asked, &Names::QUERY)
@@ -115,6 +121,13 @@ impl ViewQuery {
         weights: Option<&RealisationWeights>,
         format: PictureFormat,
     ) -> Result<(View, Option<Picked>), Problem> {
+        let sampled = [
+            ("spp", self.spp.is_some()),
+            ("profile", self.profile.is_some()),
+            ("max_error", self.max_error.is_some()),
+            ("max_seconds", self.max_seconds.is_some()),
+        ];
+        refuse_samples_of_angles(self.show.unwrap_or_default(), &sampled, &Names::QUERY)?;
         if let Some(asked) = &self.profile {
             asked.fits(thing)?;
         }
@@ -177,6 +190,36 @@ impl Names {
             Place::Body => format!("{}/{place}", self.light),
             _ => self.light.to_owned(),
         }
+    }
+}
+
+/// Samples per pixel of what is shown: those asked for, or the profile's; angles have none to choose.
+pub fn samples(show: Show, asked: Option<u32>, profile: &Profile) -> u32 {
+    match show {
+        Show::Paint => asked.unwrap_or(profile.samples_per_pixel),
+        Show::Aspecular => 1,
+    }
+}
+
+/// Refuses what chooses samples, by name and whether it is given, beside angles.
+///
+/// # Errors
+///
+/// [`Problem`] that names the first that is given.
+pub fn refuse_samples_of_angles(
+    show: Show,
+    given: &[(&str, bool)],
+    names: &Names,
+) -> Result<(), Problem> {
+    match given.iter().find(|(_, is)| *is) {
+        Some((name, _)) if show == Show::Aspecular => {
+            let detail = format!(
+                "{name} stands beside show=aspecular: angles follow from the scene, without samples."
+            );
+            let accepted = format!("show=aspecular without {name}, or {name} with show=paint");
+            Err(names.refuse(name, detail, accepted))
+        }
+        _ => Ok(()),
     }
 }
 

@@ -15,7 +15,7 @@ pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
 pub use crate::measurement::{Layout, ThetaHSpacing};
 pub use crate::workshop::{
-    Estimate, Format, Gloss, Light, Picked, PictureFormat, Readings, Shape, Target, Thing,
+    Estimate, Format, Gloss, Light, Picked, PictureFormat, Readings, Shape, Show, Target, Thing,
 };
 
 /// How an upload becomes a paint.
@@ -40,6 +40,9 @@ pub struct IngestOrder {
 /// What a picture shows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct View {
+    /// The paint, or its aspecular angles.
+    #[serde(skip_serializing_if = "Show::is_paint")]
+    pub show: Show,
     /// What the paint is on.
     pub scene: Shape,
     /// Pixels across and down.

@@ -104,6 +104,7 @@ fn paint_of(thing: &Thing) -> Result<&PaintFile, WorkError> {
 
 fn options_of(view: &View) -> PreviewOptions {
     PreviewOptions {
+        show: view.show,
         scene: view.scene,
         size: view.size,
         samples_per_pixel: view.samples_per_pixel,

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::service::http::{Address, Answer, Keep, Kind, Problem, ProblemDocument};
 use crate::service::parameters::{KnobsDocument, ProfileDocument};
-use crate::service::work::{Format, JobDocument, Layout, Light, Shape, ThetaHSpacing};
+use crate::service::work::{Format, JobDocument, Layout, Light, Shape, Show, ThetaHSpacing};
 
 /// Only what this service itself serves.
 const POLICY: &str =
@@ -40,7 +40,7 @@ const POLICY: &str =
     components(schemas(
         documents::PaintDocument, documents::PaintList, documents::PaintSummary, documents::BlendDocument,
         blends::BlendOrder, ProfileDocument, KnobsDocument, estimates::EstimateOrder, estimates::EstimateDocument, JobDocument, operations::Health, ProblemDocument,
-        Layout, ThetaHSpacing, Format, previews::PreviewFormat, previews::PreviewOrder, Light, Shape,
+        Layout, ThetaHSpacing, Format, previews::PreviewFormat, previews::PreviewOrder, Light, Shape, Show,
     )),
     tags(
         (name = "paints", description = "Uploads become paints"),
