@@ -4,6 +4,7 @@
 //! bilinear, wrapped in u. Files are read by [`Environment::from_bytes`].
 
 use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
 
 use serde::Serialize;
 
@@ -34,7 +35,7 @@ pub struct Held {
 pub(super) enum Source {
     Studio(Studio),
     Uniform(Vec3),
-    Map(Map),
+    Map(Arc<Map>),
 }
 
 /// A latitude-longitude picture.
@@ -104,14 +105,23 @@ impl Environment {
         Self::of(Source::Uniform(radiance))
     }
 
-    pub(super) const fn map(map: Map) -> Self {
-        Self::of(Source::Map(map))
+    pub(super) fn map(map: Map) -> Self {
+        Self::of(Source::Map(Arc::new(map)))
     }
 
     const fn of(source: Source) -> Self {
         Self {
             source,
             held: Held::NONE,
+        }
+    }
+
+    /// Pixels across and down, of a picture.
+    #[must_use]
+    pub fn size(&self) -> Option<[usize; 2]> {
+        match &self.source {
+            Source::Map(map) => Some([map.width, map.height]),
+            Source::Studio(_) | Source::Uniform(_) => None,
         }
     }
 

@@ -1,4 +1,4 @@
-//! What a picture shows, in a query or in a body: scene, size, samples, lights.
+//! What a picture shows, in a query or in a body: scene, size, samples, lights, environment.
 
 use std::str::FromStr;
 use std::sync::Arc;
@@ -13,11 +13,15 @@ use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::http::{Place, Problem};
 use crate::service::shelf::Shelved;
+use crate::service::surroundings::Surroundings;
 use crate::service::work::{Asked, Light, Picked, PictureFormat, Shape, Show, View, WorkError};
 use crate::workshop::MOST_SAMPLES;
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u32 = 4096;
+
+/// Name of the built-in environment.
+const STUDIO: &str = "studio";
 
 /// Most lights of a scene.
 const MOST_LIGHTS: usize = 16;
@@ -37,6 +41,10 @@ pub struct ViewQuery {
     /// Samples per pixel, in place of the profile's.
     #[param(minimum = 1, maximum = 4096)]
     spp: Option<u32>,
+    /// Panorama that lights it and stands behind it, the id of an answer to `POST /v1/environments`; `studio`, the built-in
+    /// one, unless given. A panorama is all the light there is unless `light` is given.
+    #[param(pattern = "^(studio|e_[0-9a-f]{32})$", example = "studio")]
+    environment: Option<String>,
     /// Direction towards the light, in place of the scene's usual one: x to the right, y up, z towards the viewer.
     #[param(style = Form, explode = false, min_items = 3, max_items = 3)]
     light: Option<Vec<f32>>,
@@ -85,7 +93,12 @@ impl<'de> Deserialize<'de> for Size {
 }
 
 impl ViewQuery {
-    fn view(&self, app: &App, spp: Option<u32>) -> Result<View, Problem> {
+    fn view(
+        &self,
+        app: &App,
+        spp: Option<u32>,
+        environment: Option<Surroundings>,
+    ) -> Result<View, Problem> {
         let Size(size) = self.size.unwrap_or(Size([512, 512]));
         let profile = self.profile.clone().unwrap_or_default().of_query()?;
         let light = self.light.as_deref().map(|list| {
@@ -106,6 +119,7 @@ impl ViewQuery {
             scene: self.scene.unwrap_or_default(),
             size,
             samples_per_pixel: samples(show, spp, &profile),
+            environment,
             lights: light.transpose()?.map(|light| vec![light]),
         };
         view(app, asked, &Names::QUERY)
@@ -133,11 +147,12 @@ impl ViewQuery {
         }
         let knobs = self.profile.is_some() || self.spp.is_some();
         let target = targets::of_query(self.max_error, self.max_seconds, knobs)?;
+        let environment = surroundings(app, self.environment.as_deref(), &Names::QUERY).await?;
         if !target.is_some() {
-            return Ok((self.view(app, self.spp)?, None));
+            return Ok((self.view(app, self.spp, environment)?, None));
         }
         // How many samples it takes is yet to be found.
-        let mut view = self.view(app, Some(1))?;
+        let mut view = self.view(app, Some(1), environment)?;
         let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(thing), weights.cloned());
         let wanted = view.clone();
         let found = app.bench.run(move || {
@@ -191,6 +206,27 @@ impl Names {
             _ => self.light.to_owned(),
         }
     }
+}
+
+/// The panorama that is asked for; `None` for the built-in studio.
+///
+/// # Errors
+///
+/// [`Problem`] for an id that no panorama has.
+pub async fn surroundings(
+    app: &App,
+    asked: Option<&str>,
+    names: &Names,
+) -> Result<Option<Surroundings>, Problem> {
+    let Some(id) = asked.filter(|id| *id != STUDIO) else {
+        return Ok(None);
+    };
+    let found = app.surroundings(id).await?;
+    found.map(Some).ok_or_else(|| {
+        let accepted = format!("{STUDIO}, or the id of an answer to POST /v1/environments");
+        let detail = format!("There is no environment {id:?}.");
+        names.refuse("environment", detail, accepted)
+    })
 }
 
 /// Samples per pixel of what is shown: those asked for, or the profile's; angles have none to choose.

@@ -205,6 +205,7 @@ impl EstimateOrder {
             scene: self.scene.unwrap_or_default(),
             size: self.size.unwrap_or([512; 2]),
             samples_per_pixel: profile.samples_per_pixel,
+            environment: None,
             lights: None,
         }
     }

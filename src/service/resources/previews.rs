@@ -136,6 +136,10 @@ pub struct PreviewOrder {
     /// Samples per pixel, in place of the profile's.
     #[schema(minimum = 1, maximum = 4096)]
     samples_per_pixel: Option<u32>,
+    /// Panorama that lights it and stands behind it, the id of an answer to `POST /v1/environments`; `studio`, the built-in
+    /// one, unless given. A panorama is all the light there is unless `lights` are given.
+    #[schema(pattern = "^(studio|e_[0-9a-f]{32})$")]
+    environment: Option<String>,
     /// Lights in place of the scene's usual one; none leaves the surroundings alone.
     #[schema(max_items = 16)]
     lights: Option<Vec<Light>>,
@@ -175,11 +179,14 @@ pub async fn create(
     asked.fits(&thing).map_err(Problem::in_body)?;
     let profile = asked.of_body()?;
     let spp = order.samples_per_pixel;
+    let environment =
+        view::surroundings(&app, order.environment.as_deref(), &view::Names::BODY).await?;
     let asked = View {
         show,
         scene: order.scene.unwrap_or_default(),
         size: order.size.unwrap_or([512, 512]),
         samples_per_pixel: view::samples(show, spp, &profile),
+        environment,
         lights: order.lights,
     };
     let view = view::view(&app, asked, &view::Names::BODY)?;

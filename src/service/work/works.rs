@@ -9,6 +9,7 @@ use serde_json::Value;
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::paint::PaintFile;
+use crate::service::surroundings::Surroundings;
 
 /// Share done, from 0 to 1. It does not return when the work was called off.
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
@@ -49,6 +50,9 @@ pub struct View {
     pub size: [u32; 2],
     /// Samples per pixel.
     pub samples_per_pixel: u32,
+    /// Panorama in place of the built-in studio.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub environment: Option<Surroundings>,
     /// Lights in place of the scene's usual one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lights: Option<Vec<Light>>,

@@ -108,7 +108,7 @@ fn options_of(view: &View) -> PreviewOptions {
         scene: view.scene,
         size: view.size,
         samples_per_pixel: view.samples_per_pixel,
-        environment: None,
+        environment: view.environment.as_ref().map(|of| of.environment.clone()),
         lights: view.lights.clone(),
     }
 }
