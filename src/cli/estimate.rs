@@ -13,7 +13,7 @@ use super::preview::FrameArgs;
 use super::profile::TargetArgs;
 use super::weights::WeightArgs;
 use crate::workshop::{
-    Estimate as Estimated, Format, IngestOptions, PictureFormat, PreviewOptions, Stage, Work,
+    Estimate as Estimated, Format, IngestOptions, PictureFormat, PreviewOptions, Show, Stage, Work,
     WorkshopError, open, sample_to_estimate,
 };
 
@@ -174,6 +174,7 @@ impl Estimate {
                 let mut profile = options.profile;
                 profile.samples_per_pixel = spp.unwrap_or(profile.samples_per_pixel);
                 let view = PreviewOptions {
+                    show: Show::Paint,
                     scene: frame.scene.into(),
                     size: [frame.size.width, frame.size.height],
                     samples_per_pixel: profile.samples_per_pixel,

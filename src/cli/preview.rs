@@ -13,7 +13,8 @@ use super::profile::TargetArgs;
 use super::progress::Progress;
 use super::weights::WeightArgs;
 use crate::workshop::{
-    PictureFormat, PreviewOptions, Shape, Work, WorkshopError, open, preview, read_environment,
+    PictureFormat, PreviewOptions, Shape, Show, Work, WorkshopError, open, preview,
+    read_environment,
 };
 
 /// Draw a paint, a blend at given weights, or a sample.
@@ -26,6 +27,15 @@ pub struct Preview {
     weights: WeightArgs,
     #[command(flatten)]
     frame: FrameArgs,
+    /// What is shown on it: the paint, or the aspecular angle, 0 to 180 degrees from the mirror image of the main light, as
+    /// bands between the instruments' angles. Angles are the same for every paint and have no samples.
+    #[arg(
+        long,
+        value_name = "WHAT",
+        default_value = "paint",
+        allow_hyphen_values = true
+    )]
+    show: ShowName,
     /// Samples per pixel, in place of the profile's.
     #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true,
         conflicts_with_all = ["max_error", "max_seconds"])]
@@ -35,7 +45,7 @@ pub struct Preview {
     environment: Option<PathBuf>,
     #[command(flatten)]
     target: TargetArgs,
-    /// Picture to write: .png for a screen, .exr for linear light.
+    /// Picture to write: .png for a screen, .exr for linear light, or for angles in degrees.
     #[arg(long, value_name = "F.png|F.exr")]
     out: PathBuf,
     /// Write the seconds each stage took.
@@ -82,6 +92,22 @@ impl From<ShapeName> for Shape {
     }
 }
 
+/// What is shown on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ShowName {
+    Paint,
+    Aspecular,
+}
+
+impl From<ShowName> for Show {
+    fn from(name: ShowName) -> Self {
+        match name {
+            ShowName::Paint => Self::Paint,
+            ShowName::Aspecular => Self::Aspecular,
+        }
+    }
+}
+
 /// `WxH` in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
@@ -112,7 +138,26 @@ impl FromStr for Size {
 }
 
 impl Preview {
+    /// An option that would be ignored is refused.
+    fn refuse_samples_of_angles(&self) -> Result<(), WorkshopError> {
+        let given = [
+            ("--spp", self.spp.is_some()),
+            ("--max-error", self.target.max_error.is_some()),
+            ("--max-seconds", self.target.max_seconds.is_some()),
+        ];
+        match given.iter().find(|(_, is)| *is) {
+            Some((option, _)) if self.show == ShowName::Aspecular => {
+                let problem = format!(
+                    "{option} beside --show aspecular: angles follow from the scene, without samples; leave the option out"
+                );
+                Err(WorkshopError::usage(option, problem))
+            }
+            _ => Ok(()),
+        }
+    }
+
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        self.refuse_samples_of_angles()?;
         let options = ReadingArgs::default().options(None, &self.target.profile)?;
         let format = PictureFormat::of_path(&self.out)?;
         let mut stages = Stages::begin();
@@ -126,6 +171,7 @@ impl Preview {
             .map(|path| read_environment(path, &options.limits))
             .transpose()?;
         let mut wanted = PreviewOptions {
+            show: self.show.into(),
             scene: self.frame.scene.into(),
             size: [self.frame.size.width, self.frame.size.height],
             samples_per_pixel: self.spp.unwrap_or(options.profile.samples_per_pixel),

@@ -4,11 +4,12 @@
 //! bilinear, wrapped in u. Files are read by [`Environment::from_bytes`].
 
 use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::studio::Studio;
-use super::vector::{Vec3, mix};
+use super::studio::{KEY, Studio};
+use super::vector::{Vec3, along, dot, mix, unit};
 
 /// The surroundings, as radiance by direction.
 #[derive(Clone, Debug)]
@@ -34,7 +35,7 @@ pub struct Held {
 pub(super) enum Source {
     Studio(Studio),
     Uniform(Vec3),
-    Map(Map),
+    Map(Arc<Map>),
 }
 
 /// A latitude-longitude picture.
@@ -104,14 +105,23 @@ impl Environment {
         Self::of(Source::Uniform(radiance))
     }
 
-    pub(super) const fn map(map: Map) -> Self {
-        Self::of(Source::Map(map))
+    pub(super) fn map(map: Map) -> Self {
+        Self::of(Source::Map(Arc::new(map)))
     }
 
     const fn of(source: Source) -> Self {
         Self {
             source,
             held: Held::NONE,
+        }
+    }
+
+    /// Pixels across and down, of a picture.
+    #[must_use]
+    pub fn size(&self) -> Option<[usize; 2]> {
+        match &self.source {
+            Source::Map(map) => Some([map.width, map.height]),
+            Source::Studio(_) | Source::Uniform(_) => None,
         }
     }
 
@@ -132,6 +142,17 @@ impl Environment {
             Source::Studio(studio) => studio.radiance(direction),
             Source::Uniform(radiance) => *radiance,
             Source::Map(map) => map.radiance(direction),
+        }
+    }
+
+    /// Unit direction towards the main light: the studio's key, a picture's brightest light. Light that is the
+    /// same from everywhere has none, and gives the y axis.
+    #[must_use]
+    pub fn main_direction(&self) -> Vec3 {
+        match &self.source {
+            Source::Studio(_) => unit(KEY),
+            Source::Uniform(_) => [0.0, 1.0, 0.0],
+            Source::Map(map) => map.brightest(),
         }
     }
 
@@ -205,9 +226,95 @@ impl Map {
     }
 }
 
+#[allow(clippy::cast_precision_loss)] // sizes of a picture
+impl Map {
+    /// Middle of the brightest light: of the brightest of 64 x 32 cells, then of all light within six degrees of its
+    /// middle, so that a light across a border of cells is not cut.
+    fn brightest(&self) -> Vec3 {
+        const CELLS: [usize; 2] = [64, 32];
+        let mut cells = vec![(0.0_f32, 0.0_f32); CELLS[0] * CELLS[1]];
+        for (y, row) in self.pixels.chunks(self.width).enumerate() {
+            for (x, pixel) in row.iter().enumerate() {
+                let cell = y * CELLS[1] / self.height * CELLS[0] + x * CELLS[0] / self.width;
+                cells[cell].0 += luminance(*pixel);
+                cells[cell].1 += 1.0;
+            }
+        }
+        let (mut brightest, mut most) = (0, 0.0);
+        for (cell, (light, count)) in cells.into_iter().enumerate() {
+            if count > 0.0 && light / count > most {
+                (brightest, most) = (cell, light / count);
+            }
+        }
+        let rows = |row: usize| (row * self.height).div_ceil(CELLS[1]);
+        let (row, column) = (brightest / CELLS[0], brightest % CELLS[0]);
+        let middle = self.middle(rows(row)..rows(row + 1), |x, _| {
+            x * CELLS[0] / self.width == column
+        });
+        let reach = 6.0_f32.to_radians();
+        let near = (reach / PI * self.height as f32).ceil();
+        let at = middle[1].clamp(-1.0, 1.0).acos() / PI * self.height as f32;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // held to the rows there are
+        let (top, end) = (
+            (at - near).max(0.0) as usize,
+            ((at + near) as usize + 1).min(self.height),
+        );
+        self.middle(top..end, |_, d| dot(d, middle) > reach.cos())
+    }
+
+    /// Direction of the mean light of some pixels of some rows.
+    fn middle(&self, rows: std::ops::Range<usize>, counts: impl Fn(usize, Vec3) -> bool) -> Vec3 {
+        let mut sum = [0.0; 3];
+        for y in rows {
+            let v = (y as f32 + 0.5) / self.height as f32;
+            for x in 0..self.width {
+                let d = Self::direction((x as f32 + 0.5) / self.width as f32, v);
+                if counts(x, d) {
+                    let light = luminance(self.pixels[y * self.width + x]);
+                    sum = along(sum, d, light * (v * PI).sin());
+                }
+            }
+        }
+        unit(sum)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[allow(clippy::cast_precision_loss)]
+    fn the_main_light_of_a_picture_is_its_sun_wherever_cells_end() {
+        let (width, height) = (128_usize, 64_usize);
+        for sun in [[0.25, 0.3], [0.5, 0.25], [0.0, 0.4], [0.7, 0.51]] {
+            let towards = Map::direction(sun[0], sun[1]);
+            let pixels = (0..width * height).map(|k| {
+                let (x, y) = ((k % width) as f32 + 0.5, (k / width) as f32 + 0.5);
+                let d = Map::direction(x / width as f32, y / height as f32);
+                [if dot(d, towards) > 4.0_f32.to_radians().cos() {
+                    1000.0
+                } else {
+                    1.0
+                }; 3]
+            });
+            let map = Map {
+                width,
+                height,
+                pixels: pixels.collect(),
+            };
+            let found = Environment::map(map).main_direction();
+            let away = dot(found, towards).clamp(-1.0, 1.0).acos().to_degrees();
+            assert!(away < 1.0, "{sun:?}: {away} degrees");
+        }
+        let dark = Map {
+            width: 1,
+            height: 1,
+            pixels: vec![[0.0; 3]],
+        };
+        assert_eq!(Environment::map(dark).main_direction(), [0.0, 1.0, 0.0]);
+    }
 
     #[test]
     #[allow(clippy::cast_precision_loss)]

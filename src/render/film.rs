@@ -6,7 +6,9 @@
 
 use std::io::Cursor;
 
-use exr::prelude::{Encoding, Image, SpecificChannels, WritableImage};
+use exr::prelude::{
+    Blocks, Compression, Encoding, Image, LineOrder, SpecificChannels, WritableImage,
+};
 use half::f16;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -80,14 +82,11 @@ impl Film {
 
     /// Screen values, 8 bits a channel, row by row.
     #[must_use]
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to 0..=255
     pub fn to_srgb8(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.pixels.len() * 3);
         for (y, row) in (0_u32..).zip(self.pixels.chunks(self.width as usize)) {
             for (x, pixel) in (0_u32..).zip(row) {
-                let shown = neutral(pixel.map(|v| v * self.exposure)).map(encode_srgb_f32);
-                let step = dither(x, y);
-                bytes.extend(shown.map(|v| (v * 255.0 + step).clamp(0.0, 255.0) as u8));
+                bytes.extend(screen(*pixel, self.exposure, x, y));
             }
         }
         bytes
@@ -99,16 +98,7 @@ impl Film {
     ///
     /// [`FilmError::Png`] from the encoder.
     pub fn to_png(&self) -> Result<Vec<u8>, FilmError> {
-        let mut bytes = Vec::new();
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
-            .write_image(
-                &self.to_srgb8(),
-                self.width,
-                self.height,
-                ExtendedColorType::Rgb8,
-            )
-            .map_err(|e| FilmError::Png(e.to_string()))?;
-        Ok(bytes)
+        write_png(self.width, self.height, &self.to_srgb8())
     }
 
     /// The picture as EXR bytes, channels R, G, B, half floats, not exposed. What a half cannot hold is held at its
@@ -135,11 +125,27 @@ impl Film {
     }
 }
 
+/// Screen values of a pixel of linear light, 8 bits a channel.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to 0..=255
+pub(super) fn screen(light: Vec3, exposure: f32, x: u32, y: u32) -> [u8; 3] {
+    let shown = neutral(light.map(|v| v * exposure)).map(encode_srgb_f32);
+    let step = dither(x, y);
+    shown.map(|v| (v * 255.0 + step).clamp(0.0, 255.0) as u8)
+}
+
 /// A step in `0..1` that spreads rounding evenly over neighbours (J. Jimenez's interleaved gradient noise, 2014).
 #[allow(clippy::cast_precision_loss)]
 fn dither(x: u32, y: u32) -> f32 {
     let wave = 0.067_110_56 * x as f32 + 0.005_837_15 * y as f32;
     (52.982_918 * wave.fract()).fract()
+}
+
+pub(super) fn write_png(width: u32, height: u32, srgb8: &[u8]) -> Result<Vec<u8>, FilmError> {
+    let mut bytes = Vec::new();
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(srgb8, width, height, ExtendedColorType::Rgb8)
+        .map_err(|e| FilmError::Png(e.to_string()))?;
+    Ok(bytes)
 }
 
 /// One layer of R, G, B.
@@ -151,24 +157,45 @@ pub(super) fn write_exr<S>(
 where
     S: exr::prelude::IntoSample,
 {
-    use exr::prelude::{Blocks, Compression, LineOrder};
-    let encoding = Encoding {
-        compression: Compression::ZIP16,
-        blocks: Blocks::ScanLines,
-        line_order: LineOrder::Increasing,
-    };
     let columns = width as usize;
     let channels = SpecificChannels::rgb(move |at: exr::prelude::Vec2<usize>| {
         pixel(at.y() * columns + at.x())
     });
     let mut bytes = Vec::new();
-    Image::from_encoded_channels((columns, height as usize), encoding, channels)
+    Image::from_encoded_channels((columns, height as usize), ENCODING, channels)
         .write()
         .non_parallel()
         .to_buffered(Cursor::new(&mut bytes))
         .map_err(|e| FilmError::Exr(e.to_string()))?;
     Ok(bytes)
 }
+
+/// One layer of one channel of 32-bit floats.
+pub(super) fn write_exr_channel(
+    width: u32,
+    height: u32,
+    name: &str,
+    pixel: impl Fn(usize) -> f32 + Sync,
+) -> Result<Vec<u8>, FilmError> {
+    let columns = width as usize;
+    let channels = SpecificChannels::build()
+        .with_channel::<f32>(name)
+        .with_pixel_fn(move |at: exr::prelude::Vec2<usize>| (pixel(at.y() * columns + at.x()),));
+    let mut bytes = Vec::new();
+    Image::from_encoded_channels((columns, height as usize), ENCODING, channels)
+        .write()
+        .non_parallel()
+        .to_buffered(Cursor::new(&mut bytes))
+        .map_err(|e| FilmError::Exr(e.to_string()))?;
+    Ok(bytes)
+}
+
+/// As all pictures are packed.
+const ENCODING: Encoding = Encoding {
+    compression: Compression::ZIP16,
+    blocks: Blocks::ScanLines,
+    line_order: LineOrder::Increasing,
+};
 
 #[cfg(test)]
 pub(super) mod tests {

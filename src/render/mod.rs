@@ -3,10 +3,12 @@
 //! [`render`] draws a ball, a capsule or a panel of physical size under directional lights and an environment, with
 //! every texel's flakes of its own, and gives back linear light ([`Film`]) and what was simulated ([`RenderReport`]).
 //! The same paint and scene give the same bytes on any number of threads: rows are shaded independently and collected in
-//! order, sample points depend on pixel and seed alone.
+//! order, sample points depend on pixel and seed alone. [`aspecular`] maps the aspecular angle in place of a paint.
 //!
 //! Left to others: which profile asks for how many samples (`accuracy`), meshes, and what a paint is (`paint`).
 
+mod aspecular;
+mod backdrop;
 mod difference;
 mod effects;
 mod environment;
@@ -34,6 +36,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use rayon::prelude::*;
 use serde::Serialize;
 
+pub use aspecular::{AspecularBand, AspecularMap, AspecularReport, MainLight, aspecular};
 pub use difference::{PictureDifference, difference};
 pub use effects::{Effect, EffectPlan, PlannedEffect};
 pub use environment::{Environment, Held};

@@ -4,6 +4,7 @@
 //! lobes, weighted by the balance heuristic (E. Veach 1997), and the coat's mirror image. All samples of a pixel are
 //! one low-discrepancy set. Flakes belong to the texel under the sample, so a pixel averages the texels it covers.
 
+use super::backdrop::behind;
 use super::effects::{Effect, EffectPlan};
 use super::environment::Source;
 use super::ground::Ground;
@@ -12,9 +13,9 @@ use super::lanes::{self, Lanes, Lanes3, WIDTH, get, set, splat3, times};
 use super::lens::Lens;
 use super::light_table::LightTable;
 use super::points::Points;
-use super::scene::{Background, Scene};
+use super::scene::Scene;
 use super::surface::{Hit, Surface};
-use super::vector::{Frame, Vec3, add, along, scale, smoothstep, unit};
+use super::vector::{Frame, Vec3, add, along, scale, unit};
 use crate::paint::{CarPaint, RandomTexture, cell_spacing};
 
 /// A scene prepared for shading one paint.
@@ -169,20 +170,20 @@ impl<'a> Shader<'a> {
         let mut batch = Batch::new();
         for index in 0..count {
             let (direction, place) = self.lens.ray(x, y, points.pair(index, 0));
-            match self.surface.meet(origin, direction) {
-                Some(hit) => {
-                    batch.push(
-                        index,
-                        hit,
-                        scale(direction, -1.0),
-                        self.cell::<FLAKES>(&hit),
-                    );
-                    if batch.count == WIDTH {
-                        sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points));
-                        batch.count = 0;
-                    }
+            if let Some(hit) = self.surface.meet(origin, direction) {
+                batch.push(
+                    index,
+                    hit,
+                    scale(direction, -1.0),
+                    self.cell::<FLAKES>(&hit),
+                );
+                if batch.count == WIDTH {
+                    sum = add(sum, self.leaving::<COATED, FLAKES>(&batch, points));
+                    batch.count = 0;
                 }
-                None => sum = add(sum, self.behind(origin, direction, place)),
+            } else {
+                let beside = behind(self.scene, &self.ground, direction, place);
+                sum = add(sum, beside);
             }
         }
         if batch.count > 0 {
@@ -352,23 +353,4 @@ impl<'a> Shader<'a> {
         }
         radiance
     }
-
-    /// What the camera sees beside the object.
-    fn behind(&self, origin: Vec3, direction: Vec3, place: [f32; 2]) -> Vec3 {
-        if self.scene.background == Background::Environment {
-            return self.scene.environment.radiance(direction);
-        }
-        let shade =
-            Ground::meet(origin, direction).map_or(0.0, |[x, z]| self.ground.occlusion(x, z));
-        sweep(place, shade)
-    }
-}
-
-/// A neutral sweep: a pool of light behind the object, darker corners, the object's shadow on the floor.
-///
-/// `place` is −1 to 1 from the middle to the nearer edges of the picture, y upwards.
-fn sweep(place: [f32; 2], shade: f32) -> Vec3 {
-    let out = (place[0] * place[0] * 0.7 + (place[1] - 0.15).powi(2)).sqrt();
-    let light = 0.40 - 0.24 * smoothstep(0.0, 1.5, out) + 0.07 * smoothstep(-0.2, -1.0, place[1]);
-    [light * (1.0 - 0.86 * shade); 3]
 }

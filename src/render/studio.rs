@@ -35,11 +35,14 @@ pub(super) struct Studio {
 /// Radiance of the floor far from the object, towards the camera.
 const FLOOR: f32 = 0.25;
 
+/// Towards the middle of the key light.
+pub(super) const KEY: Vec3 = [-0.44, 0.36, 1.0];
+
 impl Studio {
     pub(super) fn new() -> Self {
         let boxes = vec![
             // The key: a wide cloth beside the camera.
-            soft_box([-0.44, 0.36, 1.0], 0.0, [0.74, 0.38], 0.05, 1.65, 0.3),
+            soft_box(KEY, 0.0, [0.74, 0.38], 0.05, 1.65, 0.3),
             // A long strip overhead, the highlight that runs over a roof, and a tall one on the right. Mirror images of
             // lights stay clear of each other on a ball.
             soft_box([0.16, 1.0, 0.30], 0.0, [0.80, 0.055], 0.012, 8.0, 0.2),

@@ -13,6 +13,7 @@ use super::ServiceConfig;
 use super::http::Problem;
 use super::metrics::Metrics;
 use super::shelf::Shelved;
+use super::surroundings::Surroundings;
 use super::work::{Jobs, Watchers, Workbench, Works};
 use crate::store::{Blobs, Catalogue, FolderBlobs, ResultCache, SqliteCatalogue, StoreError};
 
@@ -46,6 +47,8 @@ pub struct Shared {
     pub reading: Mutex<()>,
     /// Paints and blends as they were last read.
     pub shelf: Cache<String, Arc<Shelved>>,
+    /// Panoramas as they were last read.
+    pub panoramas: Cache<String, Surroundings>,
     ready: AtomicBool,
     stopping: watch::Sender<bool>,
     /// Held open: the lock on the data folder.
@@ -96,8 +99,12 @@ impl App {
             config.disk_bytes,
         )?;
         let shelf = Cache::builder()
-            .max_capacity(config.memory_bytes / 2)
+            .max_capacity(config.memory_bytes / 4)
             .weigher(|_, shelved: &Arc<Shelved>| shelved.weight())
+            .build();
+        let panoramas = Cache::builder()
+            .max_capacity(config.memory_bytes / 4)
+            .weigher(|_, surroundings: &Surroundings| surroundings.weight())
             .build();
         let processors = rayon::current_num_threads();
         Ok(Self(Arc::new(Shared {
@@ -112,6 +119,7 @@ impl App {
             removal: RwLock::new(()),
             reading: Mutex::new(()),
             shelf,
+            panoramas,
             ready: AtomicBool::new(false),
             stopping: watch::Sender::new(false),
             _lock: lock,

@@ -1,7 +1,7 @@
 //! Addresses: what names a paint, a blend, a job, a request.
 //!
 //! A paint's id is made of its upload and the options it was ingested with, a blend's of its paints in the order asked
-//! for and its options: the same request has the same address for ever. Ids begin with a letter that says of what.
+//! for and its options: the same request has the same address for ever. A panorama's is that of its bytes. Ids begin with a letter that says of what.
 
 use serde::Serialize;
 
@@ -18,6 +18,12 @@ const DIGITS: usize = 32;
 pub fn made_of(prefix: &str, parts: &impl Serialize) -> String {
     let hash = key(prefix, parts).to_string();
     format!("{prefix}{}", &hash[..DIGITS])
+}
+
+/// The id of these very bytes, whatever the model makes of them.
+#[must_use]
+pub fn of_content(prefix: &str, content: Hash) -> String {
+    format!("{prefix}{}", &content.to_string()[..DIGITS])
 }
 
 /// The hash of what these parts make. Parts serialise in a fixed order, so equal parts have equal hashes.

@@ -21,8 +21,8 @@ use tower::limit::GlobalConcurrencyLimitLayer;
 use super::app::App;
 use super::http::{JSON_BYTES, Problem, envelope};
 use super::resources::{
-    accuracy, blend_bundles, blends, docs, estimates, home, jobs, operations, paints, previews,
-    readings, realisations, uploads, visibility,
+    accuracy, blend_bundles, blends, docs, environments, estimates, home, jobs, operations, paints,
+    previews, readings, realisations, uploads, visibility,
 };
 use super::work::{Works, runner};
 use crate::service::ServiceConfig;
@@ -113,6 +113,15 @@ fn resources() -> Router<App> {
             get(realisations::of_blend),
         )
         .route("/v1/blends/{id}/preview.{format}", get(previews::of_blend))
+        .route(
+            "/v1/environments",
+            axum::routing::post(environments::upload),
+        )
+        .route(
+            "/v1/environments/{id}",
+            get(environments::show).delete(environments::delete),
+        )
+        .route("/v1/environments/{id}/file", get(environments::file))
         .route("/v1/estimates", axum::routing::post(estimates::create))
         .route("/v1/accuracy", get(accuracy::show))
         .route("/v1/jobs/{id}", get(jobs::show).delete(jobs::cancel))

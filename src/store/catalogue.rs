@@ -1,6 +1,6 @@
-//! The catalogue: which paints and blends there are, and which jobs are to be done.
+//! The catalogue: which paints, blends and panoramas there are, and which jobs are to be done.
 //!
-//! Records are names, hashes and opaque JSON. Three small traits, one per resource; [`Catalogue`] is all of them.
+//! Records are names, hashes and opaque JSON. Four small traits, one per resource; [`Catalogue`] is all of them.
 
 use serde::{Deserialize, Serialize};
 
@@ -66,6 +66,21 @@ pub struct BlendRecord {
     pub options: String,
     /// Blob of the `.blend` file.
     pub blend: Hash,
+}
+
+/// A panorama that was uploaded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EnvironmentRecord {
+    /// Address.
+    pub id: String,
+    /// Ending of the file's name.
+    pub format: String,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Blob of the file.
+    pub file: Hash,
 }
 
 /// What a job makes.
@@ -180,6 +195,18 @@ pub trait Blends: Send + Sync {
     fn blend<'a>(&'a self, id: &'a str) -> Task<'a, Option<BlendRecord>>;
 }
 
+/// Panoramas on record.
+pub trait Environments: Send + Sync {
+    /// Adds a panorama; `false` when its id is there already, which changes nothing.
+    fn add_environment<'a>(&'a self, environment: &'a EnvironmentRecord) -> Task<'a, bool>;
+
+    /// The panorama of this id.
+    fn environment<'a>(&'a self, id: &'a str) -> Task<'a, Option<EnvironmentRecord>>;
+
+    /// Removes a panorama and hands out what was on record.
+    fn remove_environment<'a>(&'a self, id: &'a str) -> Task<'a, Option<EnvironmentRecord>>;
+}
+
 /// Jobs on record.
 pub trait JobBook: Send + Sync {
     /// Records a job as queued, unless its subject has an unfinished one: then that one is the answer.
@@ -210,14 +237,14 @@ pub trait JobBook: Send + Sync {
 }
 
 /// The whole catalogue.
-pub trait Catalogue: Paints + Blends + JobBook {
+pub trait Catalogue: Paints + Blends + Environments + JobBook {
     /// Asks the backend for a sign of life.
     fn ping(&self) -> Task<'_, ()>;
 
     /// Ties a key to a subject unless it is tied, and says to which. Beyond `keep` keys the oldest are forgotten.
     fn tie_key<'a>(&'a self, key: &'a str, subject: &'a str, keep: u32) -> Task<'a, String>;
 
-    /// Whether a paint, a blend or the request of an unfinished job names this blob.
+    /// Whether a paint, a blend, a panorama or the request of an unfinished job names this blob.
     fn names_blob(&self, blob: Hash) -> Task<'_, bool>;
 }
 

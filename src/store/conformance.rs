@@ -283,6 +283,29 @@ fn new_job(id: &str, subject: &str, request: &str) -> NewJob {
     }
 }
 
+/// What [`Environments`] promises, on a catalogue without panoramas.
+async fn environments_conform(catalogue: &dyn Catalogue) {
+    let sky = EnvironmentRecord {
+        id: "e_1".to_owned(),
+        format: "hdr".to_owned(),
+        width: 1024,
+        height: 512,
+        file: Hash::of(b"sky"),
+    };
+    assert!(!catalogue.names_blob(sky.file).await.expect("asks"));
+    assert!(catalogue.add_environment(&sky).await.expect("adds"));
+    assert!(!catalogue.add_environment(&sky).await.expect("adds nothing"));
+    assert!(catalogue.names_blob(sky.file).await.expect("asks"));
+    let found = catalogue.environment("e_1").await.expect("reads");
+    assert_eq!(found.as_ref(), Some(&sky));
+    assert!(catalogue.environment("e_2").await.expect("reads").is_none());
+    let gone = catalogue.remove_environment("e_1").await.expect("removes");
+    assert_eq!(gone, Some(sky.clone()));
+    let gone = catalogue.remove_environment("e_1").await.expect("removes");
+    assert_eq!(gone, None);
+    assert!(!catalogue.names_blob(sky.file).await.expect("asks"));
+}
+
 /// What [`JobBook`] promises, on a catalogue without unfinished jobs.
 async fn jobs_conform(catalogue: &dyn Catalogue) {
     let first = catalogue
@@ -390,6 +413,7 @@ async fn sqlite_keeps_records_and_jobs() {
     let file = root.path().join("catalogue.sqlite");
     let catalogue = SqliteCatalogue::open(&file).await.expect("opens");
     records_conform(&catalogue).await;
+    environments_conform(&catalogue).await;
     jobs_conform(&catalogue).await;
     catalogue.close().await;
     let again = SqliteCatalogue::open(&file).await.expect("opens again");

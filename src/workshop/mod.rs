@@ -23,7 +23,7 @@ mod target;
 mod thing;
 
 pub use crate::export::{Gloss, Readings};
-pub use crate::render::Shape;
+pub use crate::render::{Environment, EnvironmentError, Shape};
 pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};
@@ -35,7 +35,7 @@ pub use ingest::{
     ingest_in_stages, ingest_upload, is_paint_file, open_measurement,
 };
 pub use previewing::{
-    Light, MOST_SAMPLES, PictureFormat, PreviewOptions, preview, read_environment, texels,
+    Light, MOST_SAMPLES, PictureFormat, PreviewOptions, Show, preview, read_environment, texels,
 };
 pub use reading::{MOST_ANGLES, color_difference, gloss, readings};
 pub use realising::{Format, Made, realise};

@@ -1,4 +1,4 @@
-//! Pictures of a paint, and its flakes texel by texel.
+//! Pictures of a paint or of its aspecular angles, and its flakes texel by texel.
 
 use std::path::Path;
 
@@ -17,9 +17,31 @@ use crate::render::{
 /// Most samples of one picture that a service draws or a target is looked for with: pixels times samples per pixel.
 pub const MOST_SAMPLES: u64 = 1 << 28;
 
+/// What a picture shows on the object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Show {
+    /// The paint.
+    #[default]
+    Paint,
+    /// In place of it the aspecular angle, 0 to 180 degrees: how far the view is from the mirror image of the main light.
+    /// The same for every paint.
+    Aspecular,
+}
+
+impl Show {
+    /// Whether it is the paint.
+    #[must_use]
+    pub const fn is_paint(&self) -> bool {
+        matches!(self, Self::Paint)
+    }
+}
+
 /// What a picture shows.
 #[derive(Clone, Debug)]
 pub struct PreviewOptions {
+    /// The paint, or its aspecular angles.
+    pub show: Show,
     /// What the paint is on.
     pub scene: Shape,
     /// Pixels across and down.
@@ -101,7 +123,7 @@ pub fn read_environment(path: &Path, limits: &Limits) -> Result<Environment, Wor
     Environment::from_bytes(&bytes, limits).map_err(|e| WorkshopError::input(path.display(), e))
 }
 
-/// Draws a paint, or a blend at the given weights.
+/// Draws a paint, or a blend at the given weights, or the aspecular angles in place of either.
 ///
 /// # Errors
 ///
@@ -115,6 +137,9 @@ pub fn preview(
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Made, WorkshopError> {
     let scene = scene_of(options);
+    if options.show == Show::Aspecular {
+        return angles(&scene, format, limits, progress);
+    }
     let chosen = choose(thing, weights)?;
     let rendering = render::render(&chosen.paint, &scene, limits, progress).map_err(refused)?;
     let bytes = match format {
@@ -136,6 +161,26 @@ pub fn preview(
         bytes,
         report,
         notes,
+    })
+}
+
+/// The map of aspecular angles. No paint is looked at: it would be the same for all.
+fn angles(
+    scene: &Scene,
+    format: PictureFormat,
+    limits: &Limits,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Made, WorkshopError> {
+    let map = render::aspecular(scene, limits, progress).map_err(refused)?;
+    let bytes = match format {
+        PictureFormat::Png => map.to_png(),
+        PictureFormat::Exr => map.to_exr(),
+    }
+    .map_err(WorkshopError::internal)?;
+    Ok(Made {
+        bytes,
+        report: json!({ "aspecular": map.report() }),
+        notes: Vec::new(),
     })
 }
 

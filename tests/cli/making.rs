@@ -234,3 +234,28 @@ fn a_realised_paint_remembers_its_weights_and_that_its_flakes_were_simulated() {
     assert!(reduced["from"].as_u64() > Some(5), "{reduced}");
     assert_eq!(shown["paints"][1]["simulated_flakes"], true);
 }
+
+#[test]
+fn angles_are_drawn_the_same_for_every_paint_and_take_no_samples() {
+    let desk = Desk::new();
+    let draw = |paint, out, more: &[&'static str]| {
+        let asked = ["preview", paint, "--size", "40x30", "--show", "aspecular"];
+        [&asked[..], more, &["--out", out]].concat()
+    };
+    desk.ok(&draw("sample:white", "a.png", &[]));
+    desk.ok(&draw(
+        "sample:2k_acrylack",
+        "b.png",
+        &["--profile", "draft"],
+    ));
+    assert_eq!(desk.read("a.png"), desk.read("b.png"));
+    desk.ok(&draw("sample:white", "c.png", &["--scene", "panel"]));
+    assert_ne!(desk.read("a.png"), desk.read("c.png"));
+    for option in ["--spp", "--max-error", "--max-seconds"] {
+        let said = desk.refused(2, &draw("sample:white", "d.png", &[option, "1"]));
+        assert!(
+            said.contains(option) && said.contains("--show aspecular"),
+            "{said}"
+        );
+    }
+}

@@ -7,6 +7,7 @@ mod bundle;
 mod caching;
 mod client;
 mod crowds;
+mod environments;
 mod fields;
 mod house;
 mod interface;

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use carpaint::accuracy::Profile;
+use carpaint::workshop::sample_by_name;
 use serde_json::json;
 
 use crate::folder;
@@ -50,6 +52,15 @@ async fn a_picture_has_its_report_beside_it_and_a_whole_scene_is_posted() {
             json!({"paint": a, "lights": [{"towards": [0, 0, 0]}]}),
             "/lights/0",
         ),
+        (json!({"paint": a, "show": "gloss"}), "/show"),
+        (
+            json!({"paint": a, "show": "aspecular", "samples_per_pixel": 4}),
+            "/samples_per_pixel",
+        ),
+        (
+            json!({"paint": a, "show": "aspecular", "profile": "draft"}),
+            "/profile",
+        ),
         (json!({"paint": a, "format": "gif"}), "/format"),
         (json!({"paint": a, "profile": "best"}), "/profile"),
     ];
@@ -64,6 +75,67 @@ async fn a_picture_has_its_report_beside_it_and_a_whole_scene_is_posted() {
         .await
         .problem(404, "unknown-address");
     assert_eq!(problem["accepted"], "png, exr, json");
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn angles_are_the_same_for_every_paint_and_other_than_the_paint() {
+    let data = folder();
+    let house = House::real(data.path()).await;
+    let mut paints = Vec::new();
+    for name in ["white", "2k_acrylack"] {
+        let sample = sample_by_name(name).expect("a sample");
+        let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
+        let headers = [("Prefer", "wait=300")];
+        let uploaded = house
+            .ask("POST", "/v1/paints", &headers, &paint.to_bytes())
+            .await;
+        assert_eq!(uploaded.status, 201, "{}", uploaded.text());
+        paints.push(uploaded.json()["id"].as_str().expect("an id").to_owned());
+    }
+    let blend = house.blend(&[&paints[0], &paints[1]]).await;
+    let query = "size=48x32&show=aspecular";
+    let of = async |path: &str| {
+        let answer = house.get(path).await;
+        assert_eq!(
+            answer.status,
+            200,
+            "{path}: {:?}",
+            answer.header("x-request-id")
+        );
+        answer
+    };
+    let png = of(&format!("/v1/paints/{}/preview.png?{query}", paints[0])).await;
+    assert_eq!(png.header("carpaint-accuracy"), None, "nothing is sampled");
+    for same in [
+        format!("/v1/paints/{}/preview.png?{query}", paints[1]),
+        format!("/v1/blends/{blend}/preview.png?{query}&weights=0.2,0.8"),
+        format!(
+            "/v1/paints/{}/preview.png?{query}&light=-0.84,1,2",
+            paints[0]
+        ),
+    ] {
+        assert!(of(&same).await.body == png.body, "{same}");
+    }
+    for other in ["size=48x32&spp=1", "size=48x32&show=aspecular&light=0,0,1"] {
+        let path = format!("/v1/paints/{}/preview.png?{other}", paints[0]);
+        assert!(of(&path).await.body != png.body, "{other}");
+    }
+    let posted = json!({"paint": paints[0], "size": [48, 32], "show": "aspecular"});
+    let posted = house.post_json("/v1/previews", &posted.to_string()).await;
+    assert!(posted.body == png.body, "posted");
+    let exr = of(&format!("/v1/paints/{}/preview.exr?{query}", paints[0])).await;
+    assert!(exr.body.windows(14).any(|at| at == b"aspecular_deg\0"));
+    let report = of(&format!("/v1/paints/{}/preview.json?{query}", paints[0])).await;
+    let map = &report.json()["aspecular"];
+    assert_eq!(map["main_light"], "directional_light");
+    let borders: Vec<f64> = map["bands"]
+        .as_array()
+        .expect("bands")
+        .iter()
+        .map(|band| band["to_deg"].as_f64().expect("a number"))
+        .collect();
+    assert_eq!(borders, [15.0, 25.0, 45.0, 75.0, 110.0, 180.0]);
     house.close().await;
 }
 

@@ -144,6 +144,20 @@ async fn a_parameter_that_is_not_accepted_is_pointed_at() {
         (format!("{file}?alpha=1&beta=0&surprise=1"), "/surprise"),
         (format!("{file}?alpha=1&beta=0&profile=best"), "/profile"),
         (format!("{picture}&scene=cube"), "/scene"),
+        (format!("{picture}&show=gloss"), "/show"),
+        (format!("{picture}&show=aspecular&spp=4"), "/spp"),
+        (
+            format!("{picture}&show=aspecular&profile=draft"),
+            "/profile",
+        ),
+        (
+            format!("{picture}&show=aspecular&max_error=1"),
+            "/max_error",
+        ),
+        (
+            format!("{picture}&show=aspecular&max_seconds=1"),
+            "/max_seconds",
+        ),
         (format!("{picture}&size=0x9"), "/size"),
         (format!("{picture}&spp=0"), "/spp"),
         (format!("/v1/paints/{paint}/preview.png?alpha=1"), "/alpha"),

@@ -52,6 +52,24 @@ pub enum BlendProblems {
     Any(ProblemDocument),
 }
 
+/// What the address of an environment may answer instead.
+#[derive(IntoResponses)]
+#[allow(dead_code)] // says what is answered
+pub enum EnvironmentProblems {
+    #[response(
+        status = 404,
+        description = "There is no such environment",
+        content_type = "application/problem+json"
+    )]
+    Unknown(ProblemDocument),
+    #[response(
+        status = "default",
+        description = "A problem",
+        content_type = "application/problem+json"
+    )]
+    Any(ProblemDocument),
+}
+
 /// What the address of a job may answer instead.
 #[derive(IntoResponses)]
 #[allow(dead_code)] // says what is answered

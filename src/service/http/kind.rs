@@ -15,6 +15,8 @@ pub enum Kind {
     UnknownPaint,
     /// No blend of this id.
     UnknownBlend,
+    /// No panorama of this id.
+    UnknownEnvironment,
     /// No job of this id.
     UnknownJob,
     /// The paint has no measurement to give back.
@@ -39,6 +41,8 @@ pub enum Kind {
     InvalidValue,
     /// An upload that is no measurement, or a damaged one.
     UnusableMeasurement,
+    /// An upload that is no panorama, or a damaged one.
+    UnusableEnvironment,
     /// A bug, or a machine that fails us.
     Internal,
     /// More work waits than can be done soon.
@@ -49,12 +53,13 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 22] = [
         Self::MalformedRequest,
         Self::InvalidParameter,
         Self::UnknownAddress,
         Self::UnknownPaint,
         Self::UnknownBlend,
+        Self::UnknownEnvironment,
         Self::UnknownJob,
         Self::NoMeasurement,
         Self::MethodNotAllowed,
@@ -67,6 +72,7 @@ impl Kind {
         Self::UnsupportedMediaType,
         Self::InvalidValue,
         Self::UnusableMeasurement,
+        Self::UnusableEnvironment,
         Self::Internal,
         Self::Overloaded,
         Self::StorageFull,
@@ -74,6 +80,7 @@ impl Kind {
 
     /// Last part of the address, title, and status.
     #[must_use]
+    #[allow(clippy::too_many_lines)] // a table
     pub const fn told(self) -> (&'static str, &'static str, StatusCode) {
         match self {
             Self::MalformedRequest => (
@@ -99,6 +106,11 @@ impl Kind {
             Self::UnknownBlend => (
                 "unknown-blend",
                 "There is no such blend",
+                StatusCode::NOT_FOUND,
+            ),
+            Self::UnknownEnvironment => (
+                "unknown-environment",
+                "There is no such environment",
                 StatusCode::NOT_FOUND,
             ),
             Self::UnknownJob => ("unknown-job", "There is no such job", StatusCode::NOT_FOUND),
@@ -151,6 +163,11 @@ impl Kind {
             Self::UnusableMeasurement => (
                 "unusable-measurement",
                 "The upload cannot become a paint",
+                StatusCode::UNPROCESSABLE_ENTITY,
+            ),
+            Self::UnusableEnvironment => (
+                "unusable-environment",
+                "The upload cannot light a picture",
                 StatusCode::UNPROCESSABLE_ENTITY,
             ),
             Self::Internal => (

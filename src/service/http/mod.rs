@@ -20,7 +20,7 @@ pub mod receiving;
 mod waiting;
 
 pub use answer::{Answer, Keep};
-pub use documented::{BlendProblems, JobProblems, PaintProblems, Problems};
+pub use documented::{BlendProblems, EnvironmentProblems, JobProblems, PaintProblems, Problems};
 pub use envelope::envelope;
 pub use extract::{Address, JSON_BYTES, Json, NoQuery, Query, QueryOfTwo};
 pub use idempotency::Idempotency;

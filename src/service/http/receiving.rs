@@ -21,6 +21,17 @@ const LEAST_RATE: u64 = 16 << 10;
 const PATIENCE: Duration = Duration::from_secs(5);
 const MOST_DRAINED: usize = 64 << 20;
 
+/// What a body is to be.
+#[derive(Clone, Copy, Debug)]
+pub struct Expected {
+    /// Whether it may be an archive, which is unpacked file by file; anything else is held in memory as a whole.
+    pub archive: bool,
+    /// The kind of problem that a body is which is nothing of it.
+    pub unusable: Kind,
+    /// What would be accepted.
+    pub accepted: &'static str,
+}
+
 /// Refuses an upload by its headers, before a byte of it is taken in.
 ///
 /// # Errors
@@ -79,11 +90,14 @@ pub async fn drain(mut pieces: BodyDataStream) {
 /// # Errors
 ///
 /// [`Problem`] for a body that is too large, too slow, empty or broken off.
-pub async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Problem> {
+pub async fn receive(
+    app: &App,
+    body: Body,
+    expected: &Expected,
+) -> Result<Box<dyn BlobWriter>, Problem> {
     let mut writer = app.blobs.begin().await?;
     let mut pieces = body.into_data_stream();
     let (mut length, begun) = (0, Instant::now());
-    // Only an archive is unpacked file by file; anything else would be held in memory as a whole.
     let mut most = app.config.limits.bytes;
     loop {
         let piece = match tokio::time::timeout(SILENCE, pieces.next()).await {
@@ -103,7 +117,7 @@ pub async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Probl
                 return Err(Problem::new(Kind::RequestTimeout, detail));
             }
         };
-        if length == 0 && !piece.is_empty() && !piece.starts_with(b"P") {
+        if length == 0 && !piece.is_empty() && !(expected.archive && piece.starts_with(b"P")) {
             most = most.min(app.config.limits.table_bytes);
         }
         length += piece.len() as u64;
@@ -127,9 +141,9 @@ pub async fn receive(app: &App, body: Body) -> Result<Box<dyn BlobWriter>, Probl
         writer.append(piece).await?;
     }
     if length == 0 {
-        return Err(Problem::new(Kind::UnusableMeasurement, "The body is empty.")
+        return Err(Problem::new(expected.unusable, "The body is empty.")
             .at(Place::Body, "")
-            .accepting("a measured-paint package, an RGL .bsdf, an MPI 2005 table, a MERL binary or a .paint"));
+            .accepting(expected.accepted));
     }
     Ok(writer)
 }

@@ -1,4 +1,4 @@
-//! What a picture shows, in a query or in a body: scene, size, samples, lights.
+//! What a picture shows, in a query or in a body: scene, size, samples, lights, environment.
 
 use std::str::FromStr;
 use std::sync::Arc;
@@ -8,15 +8,20 @@ use utoipa::{IntoParams, ToSchema};
 
 use super::profile::ProfileText;
 use super::targets;
+use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::http::{Place, Problem};
 use crate::service::shelf::Shelved;
-use crate::service::work::{Asked, Light, Picked, PictureFormat, Shape, View, WorkError};
+use crate::service::surroundings::Surroundings;
+use crate::service::work::{Asked, Light, Picked, PictureFormat, Shape, Show, View, WorkError};
 use crate::workshop::MOST_SAMPLES;
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u32 = 4096;
+
+/// Name of the built-in environment.
+const STUDIO: &str = "studio";
 
 /// Most lights of a scene.
 const MOST_LIGHTS: usize = 16;
@@ -27,12 +32,19 @@ const MOST_LIGHTS: usize = 16;
 pub struct ViewQuery {
     /// What the paint is on, `sphere` unless given.
     scene: Option<Shape>,
+    /// What is shown on it, `paint` unless given. `aspecular` is the angle between view and mirrored main light in place of
+    /// the paint, the same for every paint and weights; it takes neither `spp`, `profile`, `max_error` nor `max_seconds`.
+    show: Option<Show>,
     /// Width and height in pixels, `512x512` unless given.
     #[param(value_type = Option<String>, pattern = "^[0-9]{1,4}x[0-9]{1,4}$", example = "512x512")]
     size: Option<Size>,
     /// Samples per pixel, in place of the profile's.
     #[param(minimum = 1, maximum = 4096)]
     spp: Option<u32>,
+    /// Panorama that lights it and stands behind it, the id of an answer to `POST /v1/environments`; `studio`, the built-in
+    /// one, unless given. A panorama is all the light there is unless `light` is given.
+    #[param(pattern = "^(studio|e_[0-9a-f]{32})$", example = "studio")]
+    environment: Option<String>,
     /// Direction towards the light, in place of the scene's usual one: x to the right, y up, z towards the viewer.
     #[param(style = Form, explode = false, min_items = 3, max_items = 3)]
     light: Option<Vec<f32>>,
@@ -81,7 +93,12 @@ impl<'de> Deserialize<'de> for Size {
 }
 
 impl ViewQuery {
-    fn view(&self, app: &App, spp: Option<u32>) -> Result<View, Problem> {
+    fn view(
+        &self,
+        app: &App,
+        spp: Option<u32>,
+        environment: Option<Surroundings>,
+    ) -> Result<View, Problem> {
         let Size(size) = self.size.unwrap_or(Size([512, 512]));
         let profile = self.profile.clone().unwrap_or_default().of_query()?;
         let light = self.light.as_deref().map(|list| {
@@ -96,10 +113,13 @@ impl ViewQuery {
                         .accepting("3 numbers, the direction towards the light")
                 })
         });
+        let show = self.show.unwrap_or_default();
         let asked = View {
+            show,
             scene: self.scene.unwrap_or_default(),
             size,
-            samples_per_pixel: spp.unwrap_or(profile.samples_per_pixel),
+            samples_per_pixel: samples(show, spp, &profile),
+            environment,
             lights: light.transpose()?.map(|light| vec![light]),
         };
         view(app, asked, &Names::QUERY)
@@ -115,16 +135,24 @@ impl ViewQuery {
         weights: Option<&RealisationWeights>,
         format: PictureFormat,
     ) -> Result<(View, Option<Picked>), Problem> {
+        let sampled = [
+            ("spp", self.spp.is_some()),
+            ("profile", self.profile.is_some()),
+            ("max_error", self.max_error.is_some()),
+            ("max_seconds", self.max_seconds.is_some()),
+        ];
+        refuse_samples_of_angles(self.show.unwrap_or_default(), &sampled, &Names::QUERY)?;
         if let Some(asked) = &self.profile {
             asked.fits(thing)?;
         }
         let knobs = self.profile.is_some() || self.spp.is_some();
         let target = targets::of_query(self.max_error, self.max_seconds, knobs)?;
+        let environment = surroundings(app, self.environment.as_deref(), &Names::QUERY).await?;
         if !target.is_some() {
-            return Ok((self.view(app, self.spp)?, None));
+            return Ok((self.view(app, self.spp, environment)?, None));
         }
         // How many samples it takes is yet to be found.
-        let mut view = self.view(app, Some(1))?;
+        let mut view = self.view(app, Some(1), environment)?;
         let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(thing), weights.cloned());
         let wanted = view.clone();
         let found = app.bench.run(move || {
@@ -177,6 +205,57 @@ impl Names {
             Place::Body => format!("{}/{place}", self.light),
             _ => self.light.to_owned(),
         }
+    }
+}
+
+/// The panorama that is asked for; `None` for the built-in studio.
+///
+/// # Errors
+///
+/// [`Problem`] for an id that no panorama has.
+pub async fn surroundings(
+    app: &App,
+    asked: Option<&str>,
+    names: &Names,
+) -> Result<Option<Surroundings>, Problem> {
+    let Some(id) = asked.filter(|id| *id != STUDIO) else {
+        return Ok(None);
+    };
+    let found = app.surroundings(id).await?;
+    found.map(Some).ok_or_else(|| {
+        let accepted = format!("{STUDIO}, or the id of an answer to POST /v1/environments");
+        let detail = format!("There is no environment {id:?}.");
+        names.refuse("environment", detail, accepted)
+    })
+}
+
+/// Samples per pixel of what is shown: those asked for, or the profile's; angles have none to choose.
+pub fn samples(show: Show, asked: Option<u32>, profile: &Profile) -> u32 {
+    match show {
+        Show::Paint => asked.unwrap_or(profile.samples_per_pixel),
+        Show::Aspecular => 1,
+    }
+}
+
+/// Refuses what chooses samples, by name and whether it is given, beside angles.
+///
+/// # Errors
+///
+/// [`Problem`] that names the first that is given.
+pub fn refuse_samples_of_angles(
+    show: Show,
+    given: &[(&str, bool)],
+    names: &Names,
+) -> Result<(), Problem> {
+    match given.iter().find(|(_, is)| *is) {
+        Some((name, _)) if show == Show::Aspecular => {
+            let detail = format!(
+                "{name} stands beside show=aspecular: angles follow from the scene, without samples."
+            );
+            let accepted = format!("show=aspecular without {name}, or {name} with show=paint");
+            Err(names.refuse(name, detail, accepted))
+        }
+        _ => Ok(()),
     }
 }
 

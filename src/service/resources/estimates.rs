@@ -16,7 +16,7 @@ use crate::service::parameters::view::{self, Side};
 use crate::service::parameters::{ProfileDocument, ProfileText, targets};
 use crate::service::shelf::Shelved;
 use crate::service::work::{
-    Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, Shape, View, WorkError,
+    Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, Shape, Show, View, WorkError,
 };
 use crate::store::LocalBlob;
 
@@ -201,9 +201,11 @@ impl EstimateOrder {
 
     fn view(&self, profile: &Profile) -> View {
         View {
+            show: Show::Paint,
             scene: self.scene.unwrap_or_default(),
             size: self.size.unwrap_or([512; 2]),
             samples_per_pixel: profile.samples_per_pixel,
+            environment: None,
             lights: None,
         }
     }

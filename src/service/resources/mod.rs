@@ -8,6 +8,7 @@ pub mod blend_bundles;
 pub mod blends;
 pub mod docs;
 pub mod documents;
+pub mod environments;
 pub mod estimates;
 pub mod home;
 pub mod jobs;

@@ -18,7 +18,7 @@ use crate::service::parameters::view::{self, Side, ViewQuery};
 use crate::service::parameters::{ProfileDocument, ProfileText, WeightQuery};
 use crate::service::shelf::Shelved;
 use crate::service::work::drawing::{self, Drawn};
-use crate::service::work::{Light, Picked, PictureFormat, Shape, View};
+use crate::service::work::{Light, Picked, PictureFormat, Shape, Show, View};
 
 /// What is sent of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -26,7 +26,7 @@ use crate::service::work::{Light, Picked, PictureFormat, Shape, View};
 pub enum PreviewFormat {
     /// Tone mapped for a screen, 8 bits.
     Png,
-    /// Linear light.
+    /// Linear light; of angles one channel of degrees, `aspecular_deg`, -1 beside the object.
     Exr,
     /// The report on the picture: what was drawn and what left out and why, what had to be clamped, how accurate it is.
     Json,
@@ -127,12 +127,19 @@ pub struct PreviewOrder {
     flake_saturation: Option<f64>,
     /// What the paint is on, `sphere` unless given.
     scene: Option<Shape>,
+    /// What is shown on it, `paint` unless given. `aspecular` is the same for every paint and weights, and takes neither
+    /// `samples_per_pixel` nor `profile`.
+    show: Option<Show>,
     /// Width and height in pixels, 512 and 512 unless given.
     #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
     size: Option<[u32; 2]>,
     /// Samples per pixel, in place of the profile's.
     #[schema(minimum = 1, maximum = 4096)]
     samples_per_pixel: Option<u32>,
+    /// Panorama that lights it and stands behind it, the id of an answer to `POST /v1/environments`; `studio`, the built-in
+    /// one, unless given. A panorama is all the light there is unless `lights` are given.
+    #[schema(pattern = "^(studio|e_[0-9a-f]{32})$")]
+    environment: Option<String>,
     /// Lights in place of the scene's usual one; none leaves the surroundings alone.
     #[schema(max_items = 16)]
     lights: Option<Vec<Light>>,
@@ -161,15 +168,25 @@ pub async fn create(
     idempotency: Idempotency,
     Json(order): Json<PreviewOrder>,
 ) -> Result<Answer, Problem> {
+    let show = order.show.unwrap_or_default();
+    let sampled = [
+        ("samples_per_pixel", order.samples_per_pixel.is_some()),
+        ("profile", order.profile.is_some()),
+    ];
+    view::refuse_samples_of_angles(show, &sampled, &view::Names::BODY)?;
     let (thing, weights) = order.thing(&app).await?;
     let asked = order.profile.clone().unwrap_or_default();
     asked.fits(&thing).map_err(Problem::in_body)?;
     let profile = asked.of_body()?;
     let spp = order.samples_per_pixel;
+    let environment =
+        view::surroundings(&app, order.environment.as_deref(), &view::Names::BODY).await?;
     let asked = View {
+        show,
         scene: order.scene.unwrap_or_default(),
         size: order.size.unwrap_or([512, 512]),
-        samples_per_pixel: spp.unwrap_or(profile.samples_per_pixel),
+        samples_per_pixel: view::samples(show, spp, &profile),
+        environment,
         lights: order.lights,
     };
     let view = view::view(&app, asked, &view::Names::BODY)?;
@@ -243,8 +260,10 @@ fn answer(drawn: Drawn, format: PreviewFormat, picked: Option<&Picked>) -> Answe
         PreviewFormat::Json => Answer::bytes("application/json", drawn.report, keep),
         _ => Answer::result(format.drawn().media_type(), drawn.picture, keep),
     };
-    answer
-        .picked(picked)
-        .header(ACCURACY, &drawn.accuracy)
-        .stage("preview", drawn.time)
+    let answer = match drawn.accuracy.as_str() {
+        // Angles are exact.
+        "" => answer,
+        accuracy => answer.header(ACCURACY, accuracy),
+    };
+    answer.picked(picked).stage("preview", drawn.time)
 }

@@ -11,7 +11,7 @@ use super::documents::PaintDocument;
 use super::making;
 use crate::service::app::App;
 use crate::service::http::{
-    Idempotency, Prefer, Problem, ProblemDocument, Problems, Query, receiving,
+    Idempotency, Kind, Prefer, Problem, ProblemDocument, Problems, Query, receiving,
 };
 use crate::service::ids;
 use crate::service::parameters::{ProfileText, targets};
@@ -20,6 +20,13 @@ use crate::service::work::{
 };
 use crate::store::{BlobWriter, Hash, JobKind};
 use crate::workshop::NAME_CHARACTERS;
+
+/// What an upload is to be.
+const MEASUREMENT: receiving::Expected = receiving::Expected {
+    archive: true,
+    unusable: Kind::UnusableMeasurement,
+    accepted: "a measured-paint package, an RGL .bsdf, an MPI 2005 table, a MERL binary or a .paint",
+};
 
 /// How an upload is read and fitted.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -140,7 +147,7 @@ pub async fn upload(
             return Err(problem);
         }
     };
-    let received = receiving::receive(&app, body).await?;
+    let received = receiving::receive(&app, body, &MEASUREMENT).await?;
     let accepted = runner::to_its_end(accept(app.clone(), received, order, idempotency)).await?;
     let Accepted { id, job, picked } = accepted;
     let address = format!("/v1/paints/{id}");

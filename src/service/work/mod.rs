@@ -27,6 +27,7 @@ pub use watchers::Watchers;
 pub use workbench::{Workbench, call_off};
 pub use works::{
     Asked, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Picked, Picture,
-    PictureFormat, Progress, Readings, Shape, Target, ThetaHSpacing, Thing, View, WorkError, Works,
+    PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing, View, WorkError,
+    Works,
 };
 pub use workshop::Workshop;

@@ -9,13 +9,14 @@ use serde_json::Value;
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::paint::PaintFile;
+use crate::service::surroundings::Surroundings;
 
 /// Share done, from 0 to 1. It does not return when the work was called off.
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
 pub use crate::measurement::{Layout, ThetaHSpacing};
 pub use crate::workshop::{
-    Estimate, Format, Gloss, Light, Picked, PictureFormat, Readings, Shape, Target, Thing,
+    Estimate, Format, Gloss, Light, Picked, PictureFormat, Readings, Shape, Show, Target, Thing,
 };
 
 /// How an upload becomes a paint.
@@ -40,12 +41,18 @@ pub struct IngestOrder {
 /// What a picture shows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct View {
+    /// The paint, or its aspecular angles.
+    #[serde(skip_serializing_if = "Show::is_paint")]
+    pub show: Show,
     /// What the paint is on.
     pub scene: Shape,
     /// Pixels across and down.
     pub size: [u32; 2],
     /// Samples per pixel.
     pub samples_per_pixel: u32,
+    /// Panorama in place of the built-in studio.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub environment: Option<Surroundings>,
     /// Lights in place of the scene's usual one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lights: Option<Vec<Light>>,

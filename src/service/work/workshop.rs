@@ -104,10 +104,11 @@ fn paint_of(thing: &Thing) -> Result<&PaintFile, WorkError> {
 
 fn options_of(view: &View) -> PreviewOptions {
     PreviewOptions {
+        show: view.show,
         scene: view.scene,
         size: view.size,
         samples_per_pixel: view.samples_per_pixel,
-        environment: None,
+        environment: view.environment.as_ref().map(|of| of.environment.clone()),
         lights: view.lights.clone(),
     }
 }

@@ -3,6 +3,7 @@
 //! One connection writes, a few read: writers queue here instead of failing with "database is locked".
 
 mod blends;
+mod environments;
 mod jobs;
 mod paints;
 
@@ -96,6 +97,7 @@ impl Catalogue for SqliteCatalogue {
             let (named,): (bool,) = sqlx::query_as(
                 "SELECT EXISTS (SELECT 1 FROM paints WHERE measurement = ?1 OR paint = ?1)
                      OR EXISTS (SELECT 1 FROM blends WHERE blend = ?1)
+                     OR EXISTS (SELECT 1 FROM environments WHERE file = ?1)
                      OR EXISTS (SELECT 1 FROM jobs WHERE state IN ('queued', 'running') AND instr(request, ?1) > 0)",
             )
             .bind(blob.to_string())

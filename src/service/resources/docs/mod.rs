@@ -9,12 +9,12 @@ use utoipa::OpenApi;
 use utoipa::openapi::PathItem;
 
 use super::{
-    accuracy, blend_bundles, blends, documents, estimates, jobs, operations, paints, previews,
-    readings, realisations, uploads, visibility,
+    accuracy, blend_bundles, blends, documents, environments, estimates, jobs, operations, paints,
+    previews, readings, realisations, uploads, visibility,
 };
 use crate::service::http::{Address, Answer, Keep, Kind, Problem, ProblemDocument};
 use crate::service::parameters::{KnobsDocument, ProfileDocument};
-use crate::service::work::{Format, JobDocument, Layout, Light, Shape, ThetaHSpacing};
+use crate::service::work::{Format, JobDocument, Layout, Light, Shape, Show, ThetaHSpacing};
 
 /// Only what this service itself serves.
 const POLICY: &str =
@@ -33,20 +33,22 @@ const POLICY: &str =
         blends::create, blends::show, blend_bundles::bundle,
         readings::show, readings::table, realisations::of_blend, realisations::of_paint,
         previews::of_blend, previews::of_paint, previews::create,
+        environments::upload, environments::show, environments::file, environments::delete,
         estimates::create, accuracy::show,
         jobs::show, jobs::events, jobs::cancel,
         operations::healthz, operations::readyz, operations::metrics,
     ),
     components(schemas(
-        documents::PaintDocument, documents::PaintList, documents::PaintSummary, documents::BlendDocument,
+        documents::PaintDocument, documents::PaintList, documents::PaintSummary, documents::BlendDocument, environments::EnvironmentDocument, environments::EnvironmentLinks,
         blends::BlendOrder, ProfileDocument, KnobsDocument, estimates::EstimateOrder, estimates::EstimateDocument, JobDocument, operations::Health, ProblemDocument,
-        Layout, ThetaHSpacing, Format, previews::PreviewFormat, previews::PreviewOrder, Light, Shape,
+        Layout, ThetaHSpacing, Format, previews::PreviewFormat, previews::PreviewOrder, Light, Shape, Show,
     )),
     tags(
         (name = "paints", description = "Uploads become paints"),
         (name = "blends", description = "Correspondences of two to five paints"),
         (name = "realisations", description = "Paints, and blends at some weights, as files"),
         (name = "previews", description = "The same as pictures"),
+        (name = "environments", description = "Panoramas that light pictures"),
         (name = "accuracy", description = "What accuracy costs, and what a request will"),
         (name = "jobs", description = "Work that takes longer"),
         (name = "operations", description = "For the operator"),
