@@ -41,6 +41,8 @@ pub(super) struct Manifest {
 impl Manifest {
     /// Reads a manifest.
     pub(super) fn parse(bytes: &[u8], limits: &Limits) -> Result<Self, PackageError> {
+        // Some editors put a byte order mark before the text.
+        let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
         let Unique(value) = serde_json::from_slice(bytes).map_err(|error| {
             let reason = if error.is_data() {
                 error.to_string()

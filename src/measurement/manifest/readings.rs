@@ -40,7 +40,11 @@ pub(super) fn multi_angle(
     let list = field.want("columns", "a list of names, the first aspecular_deg")?;
     let mut columns = Vec::new();
     for column in list.list(1000, "names")? {
-        columns.push(column.text()?.to_owned());
+        let name = column.text()?;
+        if columns.iter().any(|other| other == name) {
+            return column.refuse("a name that no other column has");
+        }
+        columns.push(name.to_owned());
     }
     let has = |name: &str| columns.iter().any(|c| c == name);
     let colors = has("L") && has("a") && has("b") || columns.iter().any(|c| c.starts_with("nm"));

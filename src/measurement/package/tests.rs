@@ -252,6 +252,11 @@ fn a_field_is_refused_by_path_value_and_what_is_accepted() {
             vec!["multi_angle.rows[0]", "4 numbers"],
         ),
         (
+            "/multi_angle/columns",
+            json!(["aspecular_deg", "L", "a", "b", "L"]),
+            vec!["multi_angle.columns[4] is \"L\"", "no other column"],
+        ),
+        (
             "/multi_angle/illuminant",
             json!("A"),
             vec!["multi_angle.illuminant is \"A\"", "D65"],
@@ -264,6 +269,16 @@ fn a_field_is_refused_by_path_value_and_what_is_accepted() {
             "{pointer}: {text}"
         );
     }
+}
+
+#[test]
+fn a_manifest_may_begin_with_a_byte_order_mark() {
+    let marked = [
+        "\u{feff}".as_bytes(),
+        &serde_json::to_vec(&manifest()).expect("JSON"),
+    ]
+    .concat();
+    all_of_it(&with_file(MANIFEST, Some(marked))).expect("read");
 }
 
 /// A good package with one file replaced; `None` leaves it out.

@@ -22,13 +22,21 @@ pub(super) fn measure(
     tell("growth with texels", 0.94);
     let texels = texels(material, goes)?;
     tell("growth with clusters", 0.95);
-    let clusters = clusters(material, goes)?;
+    let (whole_of_clusters, clusters) = clusters(material, goes)?;
     tell("growth with paints", 0.97);
-    let (whole, paints) = paints(material, goes)?;
+    let (whole_of_paints, paints) = paints(material, goes)?;
     tell("growth with pixels", 0.98);
     let pixels = pixels(material, goes)?;
     tell("growth", 1.0);
-    Ok(vec![slices, texels, clusters, whole, paints, pixels])
+    Ok(vec![
+        slices,
+        texels,
+        whole_of_clusters,
+        clusters,
+        whole_of_paints,
+        paints,
+        pixels,
+    ])
 }
 
 fn blend_of(paints: &[PaintFile], goes: usize) -> Result<f64, WorkshopError> {
@@ -85,15 +93,25 @@ fn texels(material: &Material, goes: usize) -> Result<Growth, WorkshopError> {
     Ok(Growth::new("texels", "clustering a slice", 1.0, points))
 }
 
-fn clusters(material: &mut Material, goes: usize) -> Result<Growth, WorkshopError> {
-    let mut points = Vec::new();
+/// Two paints at ever more clusters: from pictures to the blend, and the blend alone.
+fn clusters(material: &mut Material, goes: usize) -> Result<(Growth, Growth), WorkshopError> {
+    let (mut whole, mut alone) = (Vec::new(), Vec::new());
     for n in [24, 50, 100, 200] {
-        let fits = material
-            .fitted(&clustered(n, BoxRule::Moments, 1), 2)?
-            .to_vec();
-        points.push([n as f64, blend_of(&fits, goes)?]);
+        let settings = clustered(n, BoxRule::Moments, 1);
+        let mut ingested = 0.0;
+        for source in material.sources().iter().take(2) {
+            let go = || source.fit(&settings);
+            ingested += shortest(1, rayon::current_num_threads(), go)?.0;
+        }
+        let fits = material.fitted(&settings, 2)?.to_vec();
+        let seconds = blend_of(&fits, goes)?;
+        alone.push([n as f64, seconds]);
+        whole.push([n as f64, ingested + seconds]);
     }
-    Ok(Growth::new("clusters", "blending two paints", 1.6, points))
+    Ok((
+        Growth::new("clusters", "clustering and blending two paints", 1.6, whole),
+        Growth::new("clusters, blend alone", "blending two paints", 1.6, alone),
+    ))
 }
 
 /// Blends of ever more paints, as many as the study has: from pictures to the blend, and the blend alone.
