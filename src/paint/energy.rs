@@ -5,9 +5,9 @@
 //! ```
 //!
 //! integrated by a product rule over the outer hemisphere, dense where the half vector is near the normal and where the
-//! paint's own angles are. Incidences are a few fixed ones, and each at which a column of the color table or of the flakes
-//! outshines its neighbours: light reflected back along `h = n` has `θd` of that column, and between columns the paint
-//! is a mixture of them. A measured paint may exceed 1 (uncalibrated tables do); the certificate says so, it changes
+//! paint's own angles are. Incidences are a few fixed ones, some next to grazing where Fresnel's factor rises to 1, and
+//! each at which a column of the color table or of the flakes outshines its neighbours: light reflected back along
+//! `h = n` has `θd` of that column, and between columns the paint is a mixture of them. A measured paint may exceed 1 (uncalibrated tables do); the certificate says so, it changes
 //! nothing.
 
 use std::f64::consts::TAU;
@@ -59,6 +59,10 @@ fn conserves(albedo: &[f64]) -> bool {
 /// Incidences of every certificate, degrees.
 const INCIDENCE_DEG: [f64; 6] = [0.0, 30.0, 50.0, 65.0, 80.0, 89.0];
 
+/// More of them where no smooth coat reflects grazing light before it gets in: there a lobe of little F0 shines as one of
+/// F0 1, all but a thousandth of it at the last.
+const GRAZING_DEG: [f64; 2] = [89.9, 89.99];
+
 /// A column is looked at when no neighbour is brighter, and it is so many times as bright as one of them.
 const OUTSHINES: f64 = 1.05;
 
@@ -82,11 +86,14 @@ pub fn certify(paint: &CarPaint) -> EnergyCertificate {
     }
 }
 
-/// The fixed incidences, and those at which a column outshines its neighbours by more than [`OUTSHINES`].
+/// Those of every paint, next to grazing where light gets in there, and those at which a column outshines its neighbours by more than [`OUTSHINES`].
 fn incidences(reflectance: &Reflectance<'_>) -> Vec<f64> {
     let paint = reflectance.paint();
     let table = &paint.color_table;
     let mut degrees = INCIDENCE_DEG.to_vec();
+    if !paint.coat.is_some_and(|coat| coat.is_mirror() && coat.ior > 1.1) {
+        degrees.extend(GRAZING_DEG);
+    }
     let mut add = |colors: &[LinearRgb], columns: &AngleGrid| {
         let brightest: Vec<f64> = (0..columns.len())
             .map(|d| {

@@ -138,12 +138,6 @@ fn again(paints: &[PaintFile]) -> Outcome<()> {
                 .map(|(before, after)| after - before),
         );
     }
-    if !busy.is_empty() {
-        let each = median(busy) * 1e3;
-        println!(
-            "| of which processor time, all threads together | {each:.1} ms | | | processor |"
-        );
-    }
     let limit = 0.030 * slices as f64 / 576.0;
     println!(
         "| ingested paints to a blend, {slices} slices | {:.1} ms | allowed {:.1} ms | {:.2} | wall, all cores |",
@@ -151,6 +145,12 @@ fn again(paints: &[PaintFile]) -> Outcome<()> {
         limit * 1e3,
         median(seconds) / limit
     );
+    if !busy.is_empty() {
+        let each = median(busy) * 1e3;
+        println!(
+            "| of which processor time, all threads together | {each:.1} ms | | | processor |"
+        );
+    }
     Ok(())
 }
 

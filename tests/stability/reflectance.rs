@@ -581,6 +581,33 @@ fn in_a_white_furnace_a_certified_paint_gives_back_no_more_than_it_gets() {
     }
 }
 
+/// Fresnel's factor takes a lobe of F0 0 to 1 within the last degree: `ρ → 4 s` at grazing, whatever it is before.
+#[test]
+fn a_paint_at_the_limit_of_its_certificate_holds_it_up_to_grazing() {
+    for f0 in [0.0, 0.04, 1.0] {
+        for alpha in [1e-3, 0.02, 0.1, 0.5] {
+            let mut paint = paint(alpha, f0, None);
+            paint.diffuse = [0.0; 3];
+            paint.lobes[0].weight = [0.1; 3];
+            // Light is proportional to the weight: as much of it as the certificate allows.
+            let most = certify(&paint).albedo.into_iter().fold(0.0, f64::max);
+            paint.lobes[0].weight = [0.1 / most; 3];
+            assert!(certify(&paint).conserves, "F0 {f0}, alpha {alpha}");
+            for degrees in [
+                85.0, 88.0, 89.0, 89.3, 89.5, 89.7, 89.9, 89.95, 89.98, 89.99, 89.995,
+            ] {
+                let theta = f64::to_radians(degrees);
+                let [found, coarse] = furnace(&paint, [-theta.sin(), 0.0, theta.cos()]);
+                let error = (found - coarse).abs();
+                assert!(
+                    error < 5e-3 && found <= 1.0 + 1e-3 + error,
+                    "F0 {f0}, alpha {alpha} at {degrees}°: {found} ± {error}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn a_paint_that_gives_back_more_than_it_gets_is_not_certified() {
     let mut bright = paint(0.1, 1.0, None);
