@@ -1,14 +1,15 @@
 //! Addresses: what names a paint, a blend, a job, a request.
 //!
 //! A paint's id is made of its upload and the options it was ingested with, a blend's of its paints in the order asked
-//! for and its options: the same request has the same address for ever. A panorama's is that of its bytes. Ids begin with a letter that says of what.
+//! for and its options: the same request has the same address for ever. A panorama's is that of its bytes. Ids begin with a
+//! letter that says of what.
 
 use serde::Serialize;
 
 use crate::store::Hash;
 
 /// Counts up when the same request would give other bytes: addresses and kept results of before are not met again.
-pub const MODEL: u32 = 4;
+pub const MODEL: u32 = 5;
 
 /// Hexadecimal digits after the prefix: 128 bits.
 const DIGITS: usize = 32;

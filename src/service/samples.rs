@@ -80,13 +80,15 @@ async fn forget_earlier(app: &App, current: &BTreeSet<String>) -> Result<(), Pro
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::export::{About, glb};
     use crate::paint::{Chi, Limits, Reflectance, instrument_pairs};
+    use crate::render::{Scene, Shape, render};
     use crate::service::{ServiceConfig, Workshop};
     use crate::workshop::sample_by_name;
 
     /// What `MODEL` stands for: bytes that were kept under it must not change under it.
     #[test]
-    fn a_sample_that_changes_asks_for_another_model_number() {
+    fn bytes_that_change_ask_for_another_model_number() {
         let sample = sample_by_name("bmw339").expect("a sample");
         let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
         let flakes = paint.paint.flakes.as_ref().expect("flakes");
@@ -95,22 +97,47 @@ mod tests {
             let factor = reflectance.evaluate(wi, wo, Chi::Table);
             format!("{:.4}", crate::color::luminance(factor))
         });
-        let seen = (
-            ids::MODEL,
-            flakes.slices(),
-            format!("{:.1}", flakes.texture.grain_um),
-            read.join(" "),
-        );
-        let golden = GOLDEN;
+        let mut scene = Scene::new(Shape::Sphere, [24, 24]);
+        scene.samples_per_pixel = 16;
+        let drawn = render(&paint.paint, &scene, &Limits::default(), &|_| ()).expect("a picture");
+        let light: f32 = drawn.film.pixels().iter().map(|pixel| pixel[1]).sum();
+        let about = About {
+            name: paint.name.clone(),
+            provenance: paint.provenance.clone(),
+            report: serde_json::Value::Null,
+        };
+        let file = glb(&paint.paint, &about).expect("a GLB");
+        let length = u32::from_le_bytes(file[12..16].try_into().expect("four")) as usize;
+        let document: serde_json::Value =
+            serde_json::from_slice(&file[20..20 + length]).expect("JSON");
+        let material = &document["materials"][0];
+        let seen = [
+            format!("model {}", ids::MODEL),
+            format!("{} slices", flakes.slices()),
+            format!("grain {:.1}", flakes.texture.grain_um),
+            format!("instrument {}", read.join(" ")),
+            format!("picture {:.2}", light / (24.0 * 24.0)),
+            format!(
+                "glTF {:.2}",
+                material["pbrMetallicRoughness"]["roughnessFactor"]
+                    .as_f64()
+                    .expect("a number")
+            ),
+        ];
         assert_eq!(
-            (seen.0, seen.1, seen.2.as_str(), seen.3.as_str()),
-            golden,
-            "samples are other paints now: count ids::MODEL up, and bless this"
+            seen, GOLDEN,
+            "samples, pictures or GLBs are others now: count ids::MODEL up, and bless this"
         );
     }
 
-    const GOLDEN: (u32, usize, &str, &str) =
-        (4, 169, "15.9", "2.5016 1.4479 0.5679 0.1028 0.0167 0.0046");
+    const GOLDEN: [&str; 6] = [
+        "model 5",
+        "169 slices",
+        "grain 15.9",
+        "instrument 2.5016 1.4479 0.5679 0.1028 0.0167 0.0046",
+        "picture 0.30",
+        "glTF 0.41",
+    ];
 
     #[tokio::test]
     async fn samples_of_an_earlier_recipe_leave_and_uploads_stay() {
