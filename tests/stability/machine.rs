@@ -10,7 +10,7 @@ use carpaint::fit::{
 };
 use carpaint::measurement::MeasuredBrdf;
 use carpaint::paint::{
-    CarPaint, Chi, Direction, Limits, Provenance, Reflectance, Slice, half_angles, mean_color,
+    CarPaint, Chi, Coat, Direction, Limits, Provenance, Reflectance, Slice, half_angles, mean_color,
 };
 use carpaint::render::{Scene, Shape, render, texels};
 use carpaint::transport::{Cost, Method, Problem, Workspace, solve};
@@ -174,9 +174,9 @@ impl Compensated {
 
 #[test]
 fn the_mean_of_a_slice_is_that_of_a_compensated_sum_where_f32_stops_counting() {
-    // 33.6 million texels of one gray plane, each summed by the clustering in three channels: more than any picture that
-    // is accepted, and as many terms as f32 has no chance with.
-    let n = 1_u32 << 25;
+    // A hundred million texels of one gray plane, each summed by the clustering in three channels: more than any picture
+    // that is accepted, and as many terms as f32 has no chance with.
+    let n = 100_000_000_u32;
     let mut random = Stream(4);
     let plane: Vec<f32> = (0..n).map(|_| (0.3 + 0.2 * random.unit()) as f32).collect();
     let settings = ClusterSettings {
@@ -198,7 +198,7 @@ fn the_mean_of_a_slice_is_that_of_a_compensated_sum_where_f32_stops_counting() {
     }
     let want = exact.total() / f64::from(n);
     for mean in slice.mean() {
-        // A running sum in f64 is off by n EPS/2 of itself at the very most, 3.7e-9 here; the box's corners are f32, whose
+        // A running sum in f64 is off by n EPS/2 of itself at the very most, 1.1e-8 here; the box's corners are f32, whose
         // half ulp at L = 115 is 4e-6 of 116 in f, tripled in light and through the matrix: 2e-7 of a light of 1.3/π.
         assert!((mean - want).abs() < 4e-7, "{mean} instead of {want}");
     }
@@ -280,6 +280,27 @@ fn digest() -> Vec<(&'static str, f64, f64)> {
         Cost::Distance,
         &mut Workspace::default(),
     );
+    let smooth = solve(
+        &problem,
+        Method::Sinkhorn { epsilon: 0.05 },
+        Cost::Distance,
+        &mut Workspace::default(),
+    );
+    let rough = CarPaint {
+        coat: Some(Coat {
+            roughness: 0.1,
+            ..Coat::smooth(1.5)
+        }),
+        ..solid(3)
+    };
+    let highlight = light(&rough);
+    let mut random = Stream(7);
+    let texels: Vec<f32> = (0..4096).map(|_| random.unit() as f32).collect();
+    let found = Clusterer::default().cluster([&texels; 3], &ClusterSettings::default());
+    let found = found.expect("finite");
+    let clustered = (found.probability.iter().zip(&found.upper))
+        .map(|(p, upper)| p * f64::from(upper[0]))
+        .sum();
     let mut scene = Scene::new(Shape::Sphere, [32, 32]);
     scene.samples_per_pixel = 4;
     let drawn = render(&a, &scene, &Limits::default(), &|_| ()).expect("a picture");
@@ -314,17 +335,17 @@ fn digest() -> Vec<(&'static str, f64, f64)> {
         // Pixels are f32: 3,072 of them, whose roundings of 2^-24 in each of some hundred operations fall either way; but one
         // that picks another flake for a rounding differs by its whole light, a thousandth of the picture.
         ("render.light", pixels.sum::<f64>(), 1e-3),
-        (
-            "blend.settings",
-            f64::from(u8::from(*blended.settings() == BlendSettings::default())),
-            0.0,
-        ),
+        ("paint.coat", highlight, 1e-12),
+        // A sum of texels and the cube roots of two corners, which are f32: an ulp of those.
+        ("fit.clusters", clustered, 1e-6),
+        // Stops at a residual of its masses, after as many steps; its dual sum moves by as little.
+        ("transport.smooth", smooth.expect("solved").cost, 1e-9),
     ]
 }
 
 /// What [`digest`] gave in a build of the profile `dev` on x86-64. No test runs both builds: whichever is tested is held to
 /// these numbers, `cargo test` and `cargo test --release` alike, and two that meet them agree to twice the tolerance.
-const DIGEST: [(&str, f64); 12] = [
+const DIGEST: [(&str, f64); 14] = [
     ("color.lab_a", 48.065_824_920_177_135),
     ("color.difference", 7.890_569_434_651_515),
     ("paint.light", 10_150.650_871_189_984),
@@ -336,7 +357,9 @@ const DIGEST: [(&str, f64); 12] = [
     ("fit.width", 0.169_042_248_672_450_24),
     ("transport.cost", 24.014_615_716_711_106),
     ("render.light", 644.088_590_264_320_4),
-    ("blend.settings", 1.0),
+    ("paint.coat", 1_018.895_553_386_850_5),
+    ("fit.clusters", 112.787_367_970_682_68),
+    ("transport.smooth", 24.062_737_844_819_75),
 ];
 
 #[test]

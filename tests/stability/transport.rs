@@ -22,6 +22,7 @@ use carpaint::transport::{
 };
 use certificate::{faults, reference};
 use clouds::{Clouds, light_on_both_sides, nasty, of_all_scales, paint_slices};
+use generated::say;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -73,7 +74,7 @@ fn compare_with_linear_program(slices: &[Clouds]) -> usize {
                         0
                     }
                     Err(error) => {
-                        println!("good_lp failed on {k}, {}: {error}", clouds.kind);
+                        say(&format!("good_lp failed on {k}, {}: {error}", clouds.kind));
                         1
                     }
                 }
@@ -86,7 +87,7 @@ fn compare_with_linear_program(slices: &[Clouds]) -> usize {
 #[test]
 fn slices_of_paints_cost_what_the_linear_program_says() {
     let failed = compare_with_linear_program(&paint_slices(7));
-    println!("good_lp failed on {failed} of 900 paint slices");
+    say(&format!("good_lp failed on {failed} of 900 paint slices"));
     assert_eq!(failed, KNOWN_FAILURES, "of 900 the oracle is silent");
 }
 
@@ -97,8 +98,43 @@ fn slices_of_another_generator_cost_what_the_linear_program_says() {
     };
     assert_eq!(slices.len(), 900);
     let failed = compare_with_linear_program(&slices);
-    println!("good_lp failed on {failed} of the 900 generated slices");
+    say(&format!(
+        "good_lp failed on {failed} of the 900 generated slices"
+    ));
     assert_eq!(failed, KNOWN_FAILURES, "of 900 the oracle is silent");
+}
+
+/// What is wrong with the exact solver's answer.
+fn fault_of(
+    clouds: &Clouds,
+    cost: Cost,
+    workspace: &mut Workspace,
+    plan: &mut Plan,
+) -> Option<String> {
+    match Method::Exact.solve_into(&clouds.problem(), cost, workspace, plan) {
+        Ok(()) => faults(clouds, cost, plan),
+        Err(error) => Some(error.to_string()),
+    }
+}
+
+/// A fault that takes one heavy source and two far targets shrinks to these.
+#[test]
+fn a_problem_that_fails_shrinks_to_what_makes_it_fail() {
+    let clouds = &paint_slices(7)[0];
+    let far = |p: &[f64; 3]| p[0] > 20.0;
+    let heavy = clouds.source_masses.iter().copied().fold(0.0, f64::max);
+    let fails = |c: &Clouds| {
+        c.source_masses.iter().any(|m| *m >= heavy)
+            && c.target.iter().filter(|p| far(p)).count() >= 2
+    };
+    assert!(fails(clouds));
+    let least = clouds.shrunk(fails);
+    assert_eq!(
+        (least.source.len(), least.target.len()),
+        (1, 2),
+        "{least:?}"
+    );
+    let _ = least.problem();
 }
 
 #[test]
@@ -108,13 +144,16 @@ fn problems_meant_to_break_a_solver_are_certified() {
         .into_par_iter()
         .map_init(<(Workspace, Plan)>::default, |(workspace, plan), seed| {
             let clouds = nasty(&mut StdRng::seed_from_u64(seed as u64));
-            let problem = clouds.problem();
             for cost in [Cost::SquaredDistance, Cost::Distance] {
-                Method::Exact
-                    .solve_into(&problem, cost, workspace, plan)
-                    .unwrap_or_else(|error| panic!("seed {seed}, {cost:?}: {error}"));
-                if let Some(fault) = faults(&clouds, cost, plan) {
-                    panic!("seed {seed}, {cost:?}: {fault}\n{clouds:?}");
+                if let Some(fault) = fault_of(&clouds, cost, workspace, plan) {
+                    let anew = |c: &Clouds| {
+                        fault_of(c, cost, &mut Workspace::default(), &mut Plan::default())
+                    };
+                    let least = clouds.shrunk(|c| anew(c).is_some());
+                    panic!(
+                        "seed {seed}, {cost:?}: {fault}\nthe least of it: {least:?}: {:?}",
+                        anew(&least)
+                    );
                 }
             }
             if !seed.is_multiple_of(WITH_LP_EVERY) {
@@ -144,10 +183,10 @@ fn problems_meant_to_break_a_solver_are_certified() {
         .collect();
     let sum = |k: usize| outcomes.iter().map(|o| o[k]).sum::<usize>();
     let (compared, failed) = (sum(0), sum(1));
-    println!(
+    say(&format!(
         "{count} of {ALL} problems certified; good_lp agreed on {compared} and failed on {failed} of {}",
         count.div_ceil(WITH_LP_EVERY)
-    );
+    ));
     assert_eq!(failed, KNOWN_FAILURES, "of these the oracle is silent");
     assert_eq!(compared + failed, count.div_ceil(WITH_LP_EVERY));
 }
@@ -394,7 +433,7 @@ fn smaller_and_smaller_smoothing_converges_within_its_residual_or_says_that_it_c
     let mut workspace = Workspace::default();
     let hard = (0..40).map(|seed| nasty(&mut StdRng::seed_from_u64(1_000_000 + seed)));
     let slices = paint_slices(9).into_iter().step_by(300);
-    let (mut met, mut refused, mut owed) = (0, 0, 0);
+    let (mut met, mut refused, mut owed) = ([0; 9], [0; 9], 0);
     for (k, clouds) in slices.chain(hard).enumerate() {
         let problem = clouds.problem();
         let exact = solve(&problem, Method::Exact, Cost::Distance, &mut workspace).expect("solved");
@@ -418,7 +457,7 @@ fn smaller_and_smaller_smoothing_converges_within_its_residual_or_says_that_it_c
             );
             match solved {
                 Ok(plan) => {
-                    met += 1;
+                    met[power as usize] += 1;
                     let numbers = plan.source_duals.iter().chain(&plan.target_duals);
                     assert!(
                         numbers
@@ -462,7 +501,7 @@ fn smaller_and_smaller_smoothing_converges_within_its_residual_or_says_that_it_c
                     residual,
                     promised,
                 }) => {
-                    refused += 1;
+                    refused[power as usize] += 1;
                     assert!(!must, "{k}, ε {epsilon}: refused where it converges");
                     assert_eq!(
                         (steps, promised),
@@ -477,10 +516,13 @@ fn smaller_and_smaller_smoothing_converges_within_its_residual_or_says_that_it_c
             }
         }
     }
-    println!(
-        "Sinkhorn met its promise {met} times, {owed} of them owed, and said {refused} times that it could not"
-    );
+    say(&format!(
+        "Sinkhorn met its promise at 1, 0.1, … 1e-8 on {met:?} problems, {owed} of them owed, and said on {refused:?} that it \
+         could not"
+    ));
     assert!(owed > 40, "{owed}");
+    // Reached when this was written; to refuse more is to have become worse.
+    assert!(met.iter().all(|count| *count >= 42), "{met:?}");
     for epsilon in [0.0, -1.0, 1e-10, 1e4, f64::NAN, f64::INFINITY] {
         let problem = Problem::new(&[[0.0; 3]], &[1.0], &[[1.0; 3]], &[1.0]).expect("fine");
         let refused = solve(

@@ -23,6 +23,43 @@ impl Clouds {
         )
         .unwrap_or_else(|error| panic!("{error}: {self:?}"))
     }
+
+    /// The same clouds with fewer points that still fail: halves are left out, then single points, as long as it does. What
+    /// is left on a side takes over the masses of what is not.
+    pub fn shrunk(&self, fails: impl Fn(&Self) -> bool) -> Self {
+        let mut least = self.clone();
+        let mut part = least.source.len().max(least.target.len());
+        while part > 0 {
+            let smaller = (0..2).find_map(|side| {
+                let count = [least.source.len(), least.target.len()][side];
+                (0..count)
+                    .step_by(part)
+                    .filter(|_| count > part)
+                    .map(|from| least.without(side, from..(from + part).min(count)))
+                    .find(&fails)
+            });
+            match smaller {
+                Some(smaller) => least = smaller,
+                None => part /= 2,
+            }
+        }
+        least
+    }
+
+    fn without(&self, side: usize, gone: std::ops::Range<usize>) -> Self {
+        let mut rest = self.clone();
+        let (points, masses) = if side == 0 {
+            (&mut rest.source, &mut rest.source_masses)
+        } else {
+            (&mut rest.target, &mut rest.target_masses)
+        };
+        let before: f64 = masses.iter().sum();
+        points.drain(gone.clone());
+        masses.drain(gone);
+        let share = before / masses.iter().sum::<f64>();
+        masses.iter_mut().for_each(|mass| *mass *= share);
+        rest
+    }
 }
 
 fn normal(rng: &mut StdRng) -> f64 {
