@@ -192,8 +192,8 @@ pub(super) fn correspond(
     for (place, paint) in paints.iter().enumerate() {
         match &paint.flakes {
             None => report.without_flakes.push(place),
-            Some(f) if (&f.theta_h, &f.theta_d) != (&theta_h, &theta_d) => report.mixed.push(place),
-            Some(_) => {}
+            Some(f) if f.theta_h.is_near(&theta_h) && f.theta_d.is_near(&theta_d) => {}
+            Some(_) => report.mixed.push(place),
         }
     }
     let textures = textures(paints);

@@ -40,8 +40,8 @@ pub(super) fn clusters_at(
         return;
     };
     let (row, column) = (
-        flakes.theta_h.bracket(theta_h_deg),
-        flakes.theta_d.bracket(theta_d_deg),
+        flakes.theta_h.bracket_of_near(theta_h_deg),
+        flakes.theta_d.bracket_of_near(theta_d_deg),
     );
     let ends = |b: Bracket| [(b.low, 1.0 - b.fraction), (b.high, b.fraction)];
     let mut parts = 0;

@@ -149,6 +149,29 @@ impl AngleGrid {
         }
     }
 
+    /// As [`Self::bracket`], but an angle nearer than [`LEAST_STEP_DEG`] to one of the grid's counts as that: what
+    /// [`Self::union`] makes one is one.
+    #[must_use]
+    pub fn bracket_of_near(&self, angle_deg: f64) -> Bracket {
+        let bracket = self.bracket(angle_deg);
+        let near = |index: &usize| (self.degrees[*index] - angle_deg).abs() < LEAST_STEP_DEG;
+        match [bracket.low, bracket.high].into_iter().find(near) {
+            Some(index) => Bracket {
+                low: index,
+                high: index,
+                fraction: 0.0,
+            },
+            None => bracket,
+        }
+    }
+
+    /// Whether both grids have the same angles, but for less than [`LEAST_STEP_DEG`].
+    #[must_use]
+    pub fn is_near(&self, other: &Self) -> bool {
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() < LEAST_STEP_DEG;
+        self.len() == other.len() && self.degrees.iter().zip(&other.degrees).all(near)
+    }
+
     /// The angles of both grids, each once; of two nearer than [`LEAST_STEP_DEG`] the smaller.
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
@@ -248,6 +271,26 @@ mod tests {
         );
         assert!(AngleGrid::new(vec![f64::NAN]).is_err());
         assert!(AngleGrid::new(vec![0.0, 90.1]).is_err());
+    }
+
+    #[test]
+    fn angles_that_were_rounded_otherwise_are_the_same_angles() {
+        let grid = |degrees: &[f64]| AngleGrid::new(degrees.to_vec()).expect("a grid");
+        let (exact, rounded) = (
+            grid(&[0.0, 66.0 / 23.0, 132.0 / 23.0]),
+            grid(&[0.0, 2.8696, 5.7391]),
+        );
+        let both = exact.union(&rounded);
+        assert_eq!(both.degrees(), [0.0, 66.0 / 23.0, 5.7391]);
+        assert!(both.is_near(&exact) && both.is_near(&rounded));
+        for grid in [&exact, &rounded] {
+            for (k, &angle) in both.degrees().iter().enumerate() {
+                let bracket = grid.bracket_of_near(angle);
+                assert_eq!((bracket.low, bracket.high, bracket.fraction), (k, k, 0.0));
+            }
+        }
+        assert!(!exact.is_near(&grid(&[0.0, 2.8698, 5.7391])));
+        assert_eq!(exact.bracket_of_near(1.0), exact.bracket(1.0));
     }
 
     #[test]

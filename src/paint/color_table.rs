@@ -130,7 +130,10 @@ impl ColorTable {
         let mut nodes = Vec::with_capacity(theta_h.len() * theta_d.len());
         for &h in theta_h.degrees() {
             for &d in theta_d.degrees() {
-                let (row, column) = (self.theta_h.bracket(h), self.theta_d.bracket(d));
+                let (row, column) = (
+                    self.theta_h.bracket_of_near(h),
+                    self.theta_d.bracket_of_near(d),
+                );
                 nodes.push(match (on_node(row), on_node(column)) {
                     (Some(r), Some(c)) => self.nodes[r * self.theta_d.len() + c],
                     _ => Lab::from_rgb(bilinear(&rgb, self.theta_d.len(), row, column)),
