@@ -176,6 +176,12 @@ impl Archive {
             reason: error.to_string(),
         };
         let mut cursor = Cursor::new(source.clone()).map_err(|e| archive(&e))?;
+        let length = cursor.length;
+        let headless = |error: &dyn std::fmt::Display| PackageError::Archive {
+            reason: format!(
+                "{error}; an archive's directory is its end, and {length} bytes are here, perhaps not all of them"
+            ),
+        };
         if cursor.length > limits.bytes {
             return Err(PackageError::Size {
                 file: "the package".into(),
@@ -184,14 +190,16 @@ impl Archive {
             });
         }
         // A directory of millions would be held in memory before it could be counted.
-        let announced = announced_entries(&mut cursor).map_err(|e| archive(&e))?;
+        let announced = announced_entries(&mut cursor).map_err(|e| headless(&e))?;
         if announced > limits.entries as u64 {
             return Err(PackageError::Entries {
                 count: usize::try_from(announced).unwrap_or(usize::MAX),
                 accepted: limits.entries,
             });
         }
-        let directory = ZipArchive::new(cursor).map_err(|e| archive(&e))?.metadata();
+        let directory = ZipArchive::new(cursor)
+            .map_err(|e| headless(&e))?
+            .metadata();
         if directory.len() > limits.entries {
             return Err(PackageError::Entries {
                 count: directory.len(),

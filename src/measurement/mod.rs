@@ -124,6 +124,14 @@ pub enum MeasurementError {
         /// What it is instead, as far as its first bytes say.
         what: String,
     },
+    /// A stated layout that the first bytes contradict.
+    #[error("layout is {}, accepted is {}, as which the file begins; without a layout it is found out", stated.name(), found.name())]
+    Stated {
+        /// The layout that was said.
+        stated: Layout,
+        /// The one whose beginning no other file has.
+        found: Layout,
+    },
     /// More bytes than are accepted.
     #[error("the measurement has {bytes} bytes, accepted are {accepted}")]
     Size {
@@ -147,17 +155,24 @@ pub enum MeasurementError {
 ///
 /// # Errors
 ///
-/// [`MeasurementError::Unknown`] when neither tells.
+/// [`MeasurementError::Unknown`] when neither tells, [`MeasurementError::Stated`] for a stated layout that is not the file's.
 pub fn sniff(bytes: &[u8], options: &ReadOptions) -> Result<Layout, MeasurementError> {
-    if let Some(layout) = options.layout {
-        return Ok(layout);
+    let begins_as = if bytes.starts_with(tensor::MAGIC) {
+        Some(Layout::Rgl)
+    } else if bytes.starts_with(b"PK") {
+        Some(Layout::Package)
+    } else {
+        None
+    };
+    match (options.layout, begins_as) {
+        (Some(stated), Some(found)) if stated != found => {
+            return Err(MeasurementError::Stated { stated, found });
+        }
+        (Some(layout), _) | (None, Some(layout)) => return Ok(layout),
+        (None, None) => {}
     }
     let header = options.header_bytes.unwrap_or(MPI_HEADER_BYTES);
-    if bytes.starts_with(tensor::MAGIC) {
-        Ok(Layout::Rgl)
-    } else if bytes.starts_with(b"PK") {
-        Ok(Layout::Package)
-    } else if bytes.len() as u64 == mpi::VALUE_BYTES.saturating_add(header) {
+    if bytes.len() as u64 == mpi::VALUE_BYTES.saturating_add(header) {
         Ok(Layout::Mpi2005)
     } else if bytes.len() == merl::FILE_BYTES || merl::begins_like_one(bytes) {
         Ok(Layout::Merl)
@@ -188,6 +203,9 @@ fn what_it_is(bytes: &[u8]) -> String {
     match known.iter().find(|(magic, _)| bytes.starts_with(magic)) {
         Some((_, what)) => (*what).to_owned(),
         None if bytes.is_empty() => "is empty".to_owned(),
+        None if bytes.trim_ascii_start().starts_with(b"{") => {
+            "is JSON; a package's paint.json comes zipped together with its pictures".to_owned()
+        }
         None if begin
             .iter()
             .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace()) =>
@@ -297,12 +315,19 @@ mod tests {
     }
 
     #[test]
-    fn the_stated_layout_wins_over_the_bytes() {
+    fn the_stated_layout_wins_where_the_bytes_do_not_tell() {
         let options = ReadOptions {
             layout: Some(Layout::Merl),
             ..ReadOptions::default()
         };
-        assert_eq!(sniff(b"tensor_file\0", &options), Ok(Layout::Merl));
+        assert_eq!(sniff(b"12345678", &options), Ok(Layout::Merl));
+        let refused = sniff(b"PK\x03\x04", &options).expect_err("a package");
+        assert!(
+            refused
+                .to_string()
+                .starts_with("layout is merl, accepted is package"),
+            "{refused}"
+        );
         assert_eq!(
             sniff(b"tensor_file\0", &ReadOptions::default()),
             Ok(Layout::Rgl)

@@ -112,6 +112,11 @@ async function blend() {
 }
 
 async function begin() {
+  // On its first start the service answers before all sample paints are made.
+  for (let asked = 0; asked < 150 && (await fetch("/readyz")).status === 503; asked++) {
+    at("caption").textContent = "Making the sample paints …";
+    await new Promise(wake => setTimeout(wake, 200));
+  }
   const { paints } = await (await ask("/v1/paints")).json();
   if (paints.length < 3) throw new Error("There are fewer than three paints. Upload some, or start without --no-samples.");
   const first = wanted.map(name => paints.find(paint => paint.name === name));

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::MANIFEST;
 use crate::color::LinearRgb;
 use crate::measurement::package::PackageError;
-use crate::paint::{AngleGrid, Limits, MAX_WEIGHT};
+use crate::paint::{AngleGrid, AngleGridError, LEAST_STEP_DEG, Limits, MAX_WEIGHT};
 
 /// Unknown keys of one object that are told one by one.
 const UNKNOWN_TOLD: usize = 8;
@@ -142,10 +142,26 @@ impl<'a> Field<'a> {
         for item in self.list(limits.angles, "angles in degrees")? {
             degrees.push(item.number(0.0, 90.0, "an angle from 0 to 90 degrees")?);
         }
-        AngleGrid::new(degrees).map_err(|error| PackageError::Field {
-            field: self.path.clone(),
-            value: error.to_string(),
-            accepted: "strictly ascending angles from 0 to 90 degrees, at least one".into(),
+        AngleGrid::new(degrees).map_err(|error| match error {
+            AngleGridError::Order {
+                index,
+                value,
+                before,
+            } => PackageError::Field {
+                field: format!("{}[{index}]", self.path),
+                value: format!("{value} after {before}"),
+                accepted: format!("at least {LEAST_STEP_DEG} degrees above the angle before it"),
+            },
+            AngleGridError::Range { index, value } => PackageError::Field {
+                field: format!("{}[{index}]", self.path),
+                value: value.to_string(),
+                accepted: "an angle from 0 to 90 degrees".into(),
+            },
+            AngleGridError::Empty => PackageError::Field {
+                field: self.path.clone(),
+                value: "empty".into(),
+                accepted: "at least one angle".into(),
+            },
         })
     }
 

@@ -214,12 +214,15 @@ fn a_field_is_refused_by_path_value_and_what_is_accepted() {
         (
             "/base/model/color_table/theta_h_deg",
             json!([30, 30]),
-            vec!["color_table.theta_h_deg", "ascend"],
+            vec![
+                "color_table.theta_h_deg[1] is 30 after 30",
+                "above the angle",
+            ],
         ),
         (
             "/flakes/theta_h_deg",
             json!([10, 0]),
-            vec!["flakes.theta_h_deg", "angle 1 is 0", "ascend"],
+            vec!["flakes.theta_h_deg[1] is 0 after 10", "above the angle"],
         ),
         (
             "/flakes/theta_i_deg",
