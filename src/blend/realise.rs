@@ -53,12 +53,21 @@ impl Blend {
         self.realised_in(wanted, lists.unwrap_or_default())
     }
 
+    /// Refuses the weights that [`Blend::realise`] refuses, and realises nothing.
+    ///
+    /// # Errors
+    ///
+    /// As [`Blend::realise`].
+    pub fn check(&self, wanted: &RealisationWeights) -> Result<(), WeightError> {
+        wanted.check(self.ingredients().map(|(name, _)| name))
+    }
+
     fn realised_in(
         &self,
         wanted: &RealisationWeights,
         lists: Boxes,
     ) -> Result<Realised, WeightError> {
-        wanted.check(self.ingredients().map(|(name, _)| name))?;
+        self.check(wanted)?;
         let by_hash = |given: &[f64]| {
             let mut weights = vec![0.0; given.len()];
             for (&place, &w) in self.asked.iter().zip(given) {

@@ -13,7 +13,7 @@ use super::profile::TargetArgs;
 use super::progress::Progress;
 use super::weights::WeightArgs;
 use crate::workshop::{
-    PictureFormat, PreviewOptions, Shape, Show, Work, WorkshopError, open, preview,
+    PictureFormat, PreviewOptions, Shape, Show, Source, Work, WorkshopError, find, open, preview,
     read_environment,
 };
 
@@ -145,15 +145,33 @@ impl Preview {
             ("--max-error", self.target.max_error.is_some()),
             ("--max-seconds", self.target.max_seconds.is_some()),
         ];
-        match given.iter().find(|(_, is)| *is) {
-            Some((option, _)) if self.show == ShowName::Aspecular => {
-                let problem = format!(
-                    "{option} beside --show aspecular: angles follow from the scene, without samples; leave the option out"
-                );
-                Err(WorkshopError::usage(option, problem))
-            }
-            _ => Ok(()),
+        let refused = |option: &str, why: &str| {
+            let problem = format!(
+                "{option} beside --show aspecular: angles follow from the scene, {why}; leave the option out"
+            );
+            Err(WorkshopError::usage(option, problem))
+        };
+        let args = &self.target.profile;
+        if self.show != ShowName::Aspecular {
+            return Ok(());
         }
+        if let Some((option, _)) = given.iter().find(|(_, is)| *is) {
+            return refused(option, "without samples");
+        }
+        let turned = args.knobs.iter().find_map(|knobs| knobs.samples_per_pixel);
+        if let Some(samples) = turned {
+            let option = format!("--knob samples_per_pixel={samples}");
+            return refused(&option, "without samples");
+        }
+        if let Some(samples) = args.knobs()?.samples_per_pixel {
+            let option = format!("--profile with samples_per_pixel={samples}");
+            return refused(&option, "without samples");
+        }
+        // A sample is made with a profile, a file is what it is.
+        if args.is_given() && !matches!(find(&self.input)?, Source::Sample(_)) {
+            return refused("--profile", "whatever the profile of a paint in a file");
+        }
+        Ok(())
     }
 
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {

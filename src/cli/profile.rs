@@ -67,6 +67,11 @@ impl ProfileArgs {
         Ok(knobs)
     }
 
+    /// Whether anything but the usual profile is asked for.
+    pub fn is_given(&self) -> bool {
+        self.profile != "standard" || !self.knobs.is_empty() || self.clusters.is_some()
+    }
+
     /// The profile these arguments mean.
     pub fn profile(&self) -> Result<Profile, WorkshopError> {
         self.knobs()?

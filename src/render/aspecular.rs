@@ -5,8 +5,8 @@
 //! the plane of incidence and give angles beyond the mirror a sign; a map has no such plane, so −15 and 15 are both 15.
 //!
 //! Object, lights and camera make the map, and nothing of a paint: it says which reading of an instrument a place in
-//! a picture is to be held against. The main light is the scene's first directional light, and that of the surroundings
-//! where there is none.
+//! a picture is to be held against. The main light is the one whose highlight the picture shows: of the directional
+//! lights and the main light of the surroundings that of the largest irradiance.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -14,13 +14,14 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::backdrop::behind;
+use super::environment_map::luminance;
 use super::film::{FilmError, screen, write_exr_channel, write_png};
 use super::ground::Ground;
 use super::lens::Lens;
 use super::surface::Surface;
 use super::tone::neutral;
 use super::vector::{Vec3, add, along, cross, dot, mix, scale, smoothstep, unit};
-use super::{RenderError, Scene};
+use super::{DirectionalLight, RenderError, Scene};
 use crate::color::{decode_srgb, encode_srgb_f32};
 use crate::paint::Limits;
 
@@ -67,10 +68,21 @@ const LOOKS: usize = 3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MainLight {
-    /// The first directional light.
+    /// A directional light.
     DirectionalLight,
-    /// The surroundings, where there are no others.
+    /// The surroundings.
     Environment,
+}
+
+/// A light that may be the main one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LightCandidate {
+    /// Where it comes from.
+    pub light: MainLight,
+    /// Unit vector towards it.
+    pub towards: Vec3,
+    /// Irradiance on a surface that faces it, linear sRGB.
+    pub irradiance: Vec3,
 }
 
 /// What a map tells.
@@ -80,6 +92,8 @@ pub struct AspecularReport {
     pub main_light: MainLight,
     /// Unit vector towards it.
     pub towards: Vec3,
+    /// All lights of the scene, the surroundings' last: the main one has the largest irradiance.
+    pub candidates: Vec<LightCandidate>,
     /// Least and most of the angles at the middles of pixels, degrees; `None` where none meets the object.
     pub range_deg: Option<[f32; 2]>,
     /// The color scale.
@@ -144,10 +158,8 @@ pub fn aspecular(
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<AspecularMap, RenderError> {
     scene.validate(limits)?;
-    let (main_light, towards) = match scene.lights.first() {
-        Some(light) => (MainLight::DirectionalLight, unit(light.towards)),
-        None => (MainLight::Environment, scene.environment.main_direction()),
-    };
+    let candidates = candidates(scene);
+    let (main_light, towards) = brightest(&candidates);
     let surface = Surface::new(scene.shape);
     let mapper = Mapper {
         scene,
@@ -183,12 +195,40 @@ pub fn aspecular(
         report: AspecularReport {
             main_light,
             towards,
+            candidates,
             range_deg,
             bands: BANDS,
         },
         degrees,
         srgb8: srgb8.concat(),
     })
+}
+
+/// All lights of a scene, the surroundings' last.
+fn candidates(scene: &Scene) -> Vec<LightCandidate> {
+    let of = |light: MainLight, by: &DirectionalLight| LightCandidate {
+        light,
+        towards: unit(by.towards),
+        irradiance: by.irradiance,
+    };
+    let directional = scene.lights.iter();
+    let around = of(MainLight::Environment, &scene.environment.main_light());
+    directional
+        .map(|by| of(MainLight::DirectionalLight, by))
+        .chain([around])
+        .collect()
+}
+
+/// The strongest candidate, the first of equals; without any light the y axis.
+fn brightest(candidates: &[LightCandidate]) -> (MainLight, Vec3) {
+    let (mut main, mut most) = ((MainLight::Environment, [0.0, 1.0, 0.0]), 0.0);
+    for of in candidates {
+        if luminance(of.irradiance) > most {
+            most = luminance(of.irradiance);
+            main = (of.light, of.towards);
+        }
+    }
+    main
 }
 
 #[allow(clippy::cast_possible_truncation)] // pixels are f32

@@ -6,15 +6,83 @@
 
 use std::io::Cursor;
 
+use exr::meta::attribute::IntegerBounds;
+use exr::meta::header::Header;
 use exr::prelude::{Compression, ReadChannels, ReadLayers};
 use image::ImageDecoder;
 
-use super::environment::{Environment, Held, Map};
+use super::environment::{Environment, Held};
+use super::environment_map::Map;
 use super::vector::Vec3;
 use crate::paint::Limits;
 
 /// Most radiance a pixel may hold.
 const MOST_LIGHT: f32 = 65504.0;
+
+/// Most channels of a layer, of which three are read.
+const MOST_CHANNELS: usize = 64;
+
+/// Least light that a picture can be exposed for: below it the factor on light would leave the range of numbers.
+const LEAST_LEVEL: f32 = 1e-30;
+
+/// A picture that was read from a file.
+#[derive(Clone, Debug)]
+pub struct EnvironmentFile {
+    /// The light.
+    pub environment: Environment,
+    /// What it was read from.
+    pub format: EnvironmentFormat,
+    /// Pixels across and down.
+    pub size: [u32; 2],
+}
+
+/// Formats that are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EnvironmentFormat {
+    /// Radiance.
+    Hdr,
+    /// `OpenEXR`.
+    Exr,
+}
+
+impl EnvironmentFormat {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Hdr, Self::Exr];
+
+    /// The format of a file that begins so.
+    fn of(bytes: &[u8]) -> Option<Self> {
+        let begins = |format: &Self| match format {
+            Self::Hdr => bytes.starts_with(b"#?"),
+            Self::Exr => bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]),
+        };
+        Self::ALL.into_iter().find(begins)
+    }
+
+    /// Ending of a file's name.
+    #[must_use]
+    pub const fn ending(self) -> &'static str {
+        match self {
+            Self::Hdr => "hdr",
+            Self::Exr => "exr",
+        }
+    }
+
+    /// Media type of a file.
+    #[must_use]
+    pub const fn media_type(self) -> &'static str {
+        match self {
+            Self::Hdr => "image/vnd.radiance",
+            Self::Exr => "image/x-exr",
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Hdr => "Radiance .hdr",
+            Self::Exr => "OpenEXR",
+        }
+    }
+}
 
 /// Why bytes are no environment.
 #[derive(Debug, thiserror::Error)]
@@ -41,6 +109,57 @@ pub enum EnvironmentError {
         /// What would be accepted.
         accepted: u64,
     },
+    /// More bytes of pixels than are accepted.
+    #[error(
+        "{width} x {height} pixels of {channels} channels unpack to {bytes} bytes, more than the {accepted} accepted"
+    )]
+    Bytes {
+        /// Pixels across.
+        width: u64,
+        /// Pixels down.
+        height: u64,
+        /// Channels of a pixel.
+        channels: usize,
+        /// Bytes of all channels.
+        bytes: u128,
+        /// What would be accepted.
+        accepted: u64,
+    },
+    /// More channels than are accepted.
+    #[error("{found} channels are more than the {MOST_CHANNELS} accepted")]
+    Channels {
+        /// How many there are.
+        found: usize,
+    },
+    /// Not twice as wide as high.
+    #[error(
+        "{width} x {height} pixels are no latitude-longitude panorama, which is twice as wide as high: {} x {height}",
+        2 * height
+    )]
+    Shape {
+        /// Pixels across.
+        width: u64,
+        /// Pixels down.
+        height: u64,
+    },
+    /// A picture that is only a part of its panorama, or more than it.
+    #[error(
+        "the data window {data} is not the display window {display}: a panorama has all its pixels and no others"
+    )]
+    Window {
+        /// Where its pixels are.
+        data: String,
+        /// Where they should be.
+        display: String,
+    },
+    /// Light too dim to expose a picture for.
+    #[error(
+        "a white card lying in it reflects {level:e}, accepted is 0 or at least {LEAST_LEVEL:e}"
+    )]
+    Dark {
+        /// What a white card reflects.
+        level: f32,
+    },
     /// A pixel that is no light.
     #[error("pixel ({x}, {y}) holds {value}, accepted is a finite number")]
     NotFinite {
@@ -58,15 +177,15 @@ impl Environment {
     ///
     /// # Errors
     ///
-    /// [`EnvironmentError`] for other formats, damaged files, too many pixels, and pixels that are not finite.
-    pub fn from_bytes(bytes: &[u8], limits: &Limits) -> Result<Self, EnvironmentError> {
-        let (width, height, mut pixels) = if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-            read_exr(bytes, limits)?
-        } else if bytes.starts_with(b"#?") {
-            read_hdr(bytes, limits)?
-        } else {
-            return Err(EnvironmentError::Format);
+    /// [`EnvironmentError`] for other formats, other shapes, damaged files, too many pixels or channels, and pixels that
+    /// are not finite.
+    pub fn from_bytes(bytes: &[u8], limits: &Limits) -> Result<EnvironmentFile, EnvironmentError> {
+        let format = EnvironmentFormat::of(bytes).ok_or(EnvironmentError::Format)?;
+        let (size, mut pixels) = match format {
+            EnvironmentFormat::Hdr => read_hdr(bytes, limits)?,
+            EnvironmentFormat::Exr => read_exr(bytes, limits)?,
         };
+        let [width, height] = size.map(|side| side as usize);
         let mut held = Held::NONE;
         for (k, pixel) in pixels.iter_mut().enumerate() {
             if let Some(&value) = pixel.iter().find(|v| !v.is_finite()) {
@@ -78,28 +197,31 @@ impl Environment {
             }
             *pixel = pixel.map(|v| held.hold(v, MOST_LIGHT));
         }
-        let map = Map {
-            width,
-            height,
-            pixels,
-        };
-        let mut environment = Self::map(map);
-        environment.held = held;
-        Ok(environment)
+        let environment = Self::map(Map::new(width, height, pixels), held);
+        let level = environment.level();
+        if level > 0.0 && level < LEAST_LEVEL {
+            return Err(EnvironmentError::Dark { level });
+        }
+        Ok(EnvironmentFile {
+            environment,
+            format,
+            size,
+        })
     }
 }
 
-type Pixels = (usize, usize, Vec<Vec3>);
+type Pixels = ([u32; 2], Vec<Vec3>);
 
+/// The size, where a panorama may have it.
 fn check(
     width: u64,
     height: u64,
     limits: &Limits,
-    format: &'static str,
-) -> Result<(usize, usize), EnvironmentError> {
+    format: EnvironmentFormat,
+) -> Result<[u32; 2], EnvironmentError> {
     if width == 0 || height == 0 {
         return Err(EnvironmentError::Damaged {
-            format,
+            format: format.name(),
             reason: format!("{width} x {height} pixels"),
         });
     }
@@ -108,56 +230,93 @@ fn check(
         height,
         accepted: limits.pixels,
     };
-    if width
-        .checked_mul(height)
-        .is_none_or(|pixels| pixels > limits.pixels)
-    {
+    let area = width.checked_mul(height);
+    if area.is_none_or(|pixels| pixels > limits.pixels) {
         return Err(too_large());
     }
-    let side = |v: u64| usize::try_from(v).map_err(|_| too_large());
-    Ok((side(width)?, side(height)?))
+    if width.abs_diff(height.saturating_mul(2)) > 1 {
+        return Err(EnvironmentError::Shape { width, height });
+    }
+    let side = |v: u64| u32::try_from(v).map_err(|_| too_large());
+    Ok([side(width)?, side(height)?])
 }
 
 fn read_hdr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
-    const FORMAT: &str = "Radiance .hdr";
+    const FORMAT: EnvironmentFormat = EnvironmentFormat::Hdr;
     let damaged = |e: image::ImageError| EnvironmentError::Damaged {
-        format: FORMAT,
+        format: FORMAT.name(),
         reason: e.to_string(),
     };
     let decoder =
         image::codecs::hdr::HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(damaged)?;
     let (w, h) = decoder.dimensions();
-    let (width, height) = check(w.into(), h.into(), limits, FORMAT)?;
-    let mut pixels: Vec<Vec3> = vec![[0.0; 3]; width * height];
+    let size = check(w.into(), h.into(), limits, FORMAT)?;
+    let mut pixels: Vec<Vec3> = vec![[0.0; 3]; w as usize * h as usize];
     decoder
         .read_image(bytemuck::cast_slice_mut(&mut pixels))
         .map_err(damaged)?;
-    Ok((width, height, pixels))
+    Ok((size, pixels))
+}
+
+/// Holds a layer against what is accepted: the reader allocates what a header claims.
+fn check_layer(header: &Header, limits: &Limits) -> Result<(), EnvironmentError> {
+    const FORMAT: EnvironmentFormat = EnvironmentFormat::Exr;
+    let (width, height) = (header.layer_size.width(), header.layer_size.height());
+    let (width, height) = (width as u64, height as u64);
+    check(width, height, limits, FORMAT)?;
+    let channels = header.channels.list.len();
+    if channels > MOST_CHANNELS {
+        return Err(EnvironmentError::Channels { found: channels });
+    }
+    let area = u128::from(width) * u128::from(height);
+    let bytes = area * header.channels.bytes_per_pixel as u128;
+    if bytes > u128::from(limits.table_bytes) {
+        return Err(EnvironmentError::Bytes {
+            width,
+            height,
+            channels,
+            bytes,
+            accepted: limits.table_bytes,
+        });
+    }
+    // exr 1.74 allocates whatever a damaged DWA block claims, terabytes included, before it looks at the data.
+    if matches!(
+        header.compression,
+        Compression::DWAA(_) | Compression::DWAB(_)
+    ) {
+        let reason = "DWA compression is not read; store the picture with ZIP or PIZ".into();
+        return Err(EnvironmentError::Damaged {
+            format: FORMAT.name(),
+            reason,
+        });
+    }
+    let (data, display) = (
+        header.data_window(),
+        header.shared_attributes.display_window,
+    );
+    if data != display {
+        let told = |of: IntegerBounds| {
+            let (at, size) = (of.position, of.size);
+            format!("{} x {} at {}, {}", size.0, size.1, at.0, at.1)
+        };
+        return Err(EnvironmentError::Window {
+            data: told(data),
+            display: told(display),
+        });
+    }
+    Ok(())
 }
 
 fn read_exr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
-    const FORMAT: &str = "OpenEXR";
+    const FORMAT: &str = EnvironmentFormat::Exr.name();
     let damaged = |e: exr::error::Error| EnvironmentError::Damaged {
         format: FORMAT,
         reason: e.to_string(),
     };
-    // The header alone first: the reader allocates what the header claims.
     let meta =
         exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     for header in &meta.headers {
-        let size = header.layer_size;
-        check(size.width() as u64, size.height() as u64, limits, FORMAT)?;
-        // exr 1.74 allocates whatever a damaged DWA block claims, terabytes included, before it looks at the data.
-        if matches!(
-            header.compression,
-            Compression::DWAA(_) | Compression::DWAB(_)
-        ) {
-            let reason = "DWA compression is not read; store the picture with ZIP or PIZ".into();
-            return Err(EnvironmentError::Damaged {
-                format: FORMAT,
-                reason,
-            });
-        }
+        check_layer(header, limits)?;
     }
     let image = exr::prelude::read()
         .no_deep_data()
@@ -188,7 +347,8 @@ fn read_exr(bytes: &[u8], limits: &Limits) -> Result<Pixels, EnvironmentError> {
             reason: "pixels are missing".into(),
         });
     }
-    Ok((width, height, pixels))
+    let size = check(width as u64, height as u64, limits, EnvironmentFormat::Exr)?;
+    Ok((size, pixels))
 }
 
 #[cfg(test)]

@@ -6,8 +6,9 @@
 
 use std::io::Cursor;
 
+use exr::error::UnitResult;
 use exr::prelude::{
-    Blocks, Compression, Encoding, Image, LineOrder, SpecificChannels, WritableImage,
+    Blocks, Compression, Encoding, Image, LineOrder, SpecificChannels, Vec2, WritableImage,
 };
 use half::f16;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -157,17 +158,10 @@ pub(super) fn write_exr<S>(
 where
     S: exr::prelude::IntoSample,
 {
-    let columns = width as usize;
-    let channels = SpecificChannels::rgb(move |at: exr::prelude::Vec2<usize>| {
-        pixel(at.y() * columns + at.x())
-    });
-    let mut bytes = Vec::new();
-    Image::from_encoded_channels((columns, height as usize), ENCODING, channels)
-        .write()
-        .non_parallel()
-        .to_buffered(Cursor::new(&mut bytes))
-        .map_err(|e| FilmError::Exr(e.to_string()))?;
-    Ok(bytes)
+    let size = (width as usize, height as usize);
+    let at = move |at: Vec2<usize>| pixel(at.y() * size.0 + at.x());
+    let image = Image::from_encoded_channels(size, ENCODING, SpecificChannels::rgb(at));
+    written(|to| image.write().non_parallel().to_buffered(to))
 }
 
 /// One layer of one channel of 32-bit floats.
@@ -177,16 +171,16 @@ pub(super) fn write_exr_channel(
     name: &str,
     pixel: impl Fn(usize) -> f32 + Sync,
 ) -> Result<Vec<u8>, FilmError> {
-    let columns = width as usize;
-    let channels = SpecificChannels::build()
-        .with_channel::<f32>(name)
-        .with_pixel_fn(move |at: exr::prelude::Vec2<usize>| (pixel(at.y() * columns + at.x()),));
+    let size = (width as usize, height as usize);
+    let channel = SpecificChannels::build().with_channel::<f32>(name);
+    let channel = channel.with_pixel_fn(move |at: Vec2<usize>| (pixel(at.y() * size.0 + at.x()),));
+    let image = Image::from_encoded_channels(size, ENCODING, channel);
+    written(|to| image.write().non_parallel().to_buffered(to))
+}
+
+fn written(write: impl FnOnce(Cursor<&mut Vec<u8>>) -> UnitResult) -> Result<Vec<u8>, FilmError> {
     let mut bytes = Vec::new();
-    Image::from_encoded_channels((columns, height as usize), ENCODING, channels)
-        .write()
-        .non_parallel()
-        .to_buffered(Cursor::new(&mut bytes))
-        .map_err(|e| FilmError::Exr(e.to_string()))?;
+    write(Cursor::new(&mut bytes)).map_err(|e| FilmError::Exr(e.to_string()))?;
     Ok(bytes)
 }
 

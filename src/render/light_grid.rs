@@ -7,7 +7,8 @@ use std::f32::consts::{PI, TAU};
 
 use rayon::prelude::*;
 
-use super::environment::{Environment, Map, Source, luminance};
+use super::environment::{Environment, Source};
+use super::environment_map::{Map, luminance};
 use super::vector::Vec3;
 
 /// Coarse cells across.

@@ -10,7 +10,8 @@
 
 use std::sync::OnceLock;
 
-use super::environment::{Environment, luminance};
+use super::environment::Environment;
+use super::environment_map::luminance;
 use super::light_grid::{Grid, HEIGHT, WIDTH};
 use super::vector::{Vec3, dot, scale, unit};
 
@@ -233,7 +234,8 @@ impl Search {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::environment::Map;
+    use crate::render::environment::Held;
+    use crate::render::environment_map::Map;
     use std::f32::consts::{PI, TAU};
 
     #[test]
@@ -254,11 +256,8 @@ mod tests {
                 0.4
             }; 3]
         });
-        let environment = Environment::map(Map {
-            width,
-            height,
-            pixels: pixels.collect(),
-        });
+        let map = Map::new(width, height, pixels.collect());
+        let environment = Environment::map(map, Held::NONE);
         let table = LightTable::new(&environment).expect("light");
         for normal in [
             [0.0, 1.0, 0.0],

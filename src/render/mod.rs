@@ -13,6 +13,7 @@ mod difference;
 mod effects;
 mod environment;
 mod environment_file;
+mod environment_map;
 mod film;
 mod ground;
 mod kernel;
@@ -36,11 +37,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use rayon::prelude::*;
 use serde::Serialize;
 
-pub use aspecular::{AspecularBand, AspecularMap, AspecularReport, MainLight, aspecular};
+pub use aspecular::{
+    AspecularBand, AspecularMap, AspecularReport, LightCandidate, MainLight, aspecular,
+};
 pub use difference::{PictureDifference, difference};
 pub use effects::{Effect, EffectPlan, PlannedEffect};
 pub use environment::{Environment, Held};
-pub use environment_file::EnvironmentError;
+pub use environment_file::{EnvironmentError, EnvironmentFile, EnvironmentFormat};
 pub use film::{Film, FilmError};
 pub use noise::SamplingError;
 pub use scene::{Background, Camera, DirectionalLight, Scene};

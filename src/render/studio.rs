@@ -9,7 +9,8 @@
 //! units in which a white diffuser facing the camera comes out near 0.7: the face of a silver is twice as bright, and
 //! must not burn out.
 
-use super::vector::{Vec3, cross, dot, scale, smoothstep, unit};
+use super::scene::DirectionalLight;
+use super::vector::{Vec3, along, cross, dot, scale, smoothstep, unit};
 
 /// One soft box.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +37,7 @@ pub(super) struct Studio {
 const FLOOR: f32 = 0.25;
 
 /// Towards the middle of the key light.
-pub(super) const KEY: Vec3 = [-0.44, 0.36, 1.0];
+const KEY: Vec3 = [-0.44, 0.36, 1.0];
 
 impl Studio {
     pub(super) fn new() -> Self {
@@ -63,7 +64,19 @@ impl Studio {
         }
         [light; 3]
     }
+
+    /// The key as a light of one direction, with the irradiance of its whole cloth.
+    pub(super) fn key(&self) -> DirectionalLight {
+        let irradiance = self.boxes.first().map_or(0.0, SoftBox::irradiance);
+        DirectionalLight {
+            towards: unit(KEY),
+            irradiance: [irradiance; 3],
+        }
+    }
 }
+
+/// Places a side at which a box is looked at for its irradiance.
+const LOOKS: u16 = 64;
 
 fn soft_box(
     center: Vec3,
@@ -109,6 +122,21 @@ impl SoftBox {
             .min(1.0);
         (cover, self.radiance * (1.0 - self.falloff * out))
     }
+
+    /// Irradiance on a surface that faces its middle. At a distance r from the middle of a plane one away, both the
+    /// solid angle of a place and its cosine shrink: by 1/(1 + r²)² in all.
+    fn irradiance(&self) -> f32 {
+        let half = self.half.map(|half| half + self.border);
+        let place = |k: u16| 2.0 * (f32::from(k) + 0.5) / f32::from(LOOKS) - 1.0;
+        let mut sum = 0.0;
+        for (row, column) in (0..LOOKS).flat_map(|row| (0..LOOKS).map(move |c| (row, c))) {
+            let (x, y) = (place(column) * half[0], place(row) * half[1]);
+            let towards = along(along(self.center, self.across, x), self.upwards, y);
+            let (cover, radiance) = self.seen(unit(towards));
+            sum += cover * radiance / (1.0 + x * x + y * y).powi(2);
+        }
+        sum * 4.0 * half[0] * half[1] / f32::from(LOOKS).powi(2)
+    }
 }
 
 /// Walls, ceiling and floor: brightest at the horizon, dim above, a grey floor below.
@@ -125,7 +153,6 @@ fn surround(direction: Vec3) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::vector::along;
 
     #[test]
     fn the_studio_is_neutral_and_bright_overhead() {
@@ -150,6 +177,36 @@ mod tests {
                     assert!(k == other || beside.seen(direction).0 == 0.0, "{k} {other}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn the_key_has_the_irradiance_of_what_is_seen_around_it() {
+        let studio = Studio::new();
+        let key = studio.key();
+        // All that is seen through a hole just around the cloth, less the wall in the cloth's place.
+        let (lamp, n) = (&studio.boxes[0], 400_u16);
+        let place = |k: u16| 2.0 * (f32::from(k) + 0.5) / f32::from(n) - 1.0;
+        let mut summed = 0.0;
+        for (j, i) in (0..n).flat_map(|j| (0..n).map(move |i| (j, i))) {
+            let (x, y) = (place(i), place(j));
+            let d = unit(along(along(lamp.center, lamp.across, x), lamp.upwards, y));
+            let (cover, _) = lamp.seen(d);
+            let light = studio.radiance(d)[0] - (1.0 - cover) * surround(d);
+            if cover > 0.0 {
+                summed += f64::from(light / (1.0 + x * x + y * y).powi(2));
+            }
+        }
+        let summed = summed * 4.0 / f64::from(n).powi(2);
+        let told = f64::from(key.irradiance[0]);
+        assert!((told / summed - 1.0).abs() < 0.01, "{told}, not {summed}");
+        // Stronger than the directional light of any shape, which the angle map relies on.
+        for shape in [
+            crate::render::Shape::Sphere,
+            crate::render::Shape::Capsule,
+            crate::render::Shape::Panel,
+        ] {
+            assert!(key.irradiance[0] > DirectionalLight::key(shape).irradiance[0]);
         }
     }
 }

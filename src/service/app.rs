@@ -10,10 +10,11 @@ use moka::future::Cache;
 use tokio::sync::{Mutex, RwLock, watch};
 
 use super::ServiceConfig;
+use super::environments::Environments;
 use super::http::Problem;
 use super::metrics::Metrics;
 use super::shelf::Shelved;
-use super::surroundings::Surroundings;
+use super::uploading::Uploading;
 use super::work::{Jobs, Watchers, Workbench, Works};
 use crate::store::{Blobs, Catalogue, FolderBlobs, ResultCache, SqliteCatalogue, StoreError};
 
@@ -47,8 +48,10 @@ pub struct Shared {
     pub reading: Mutex<()>,
     /// Paints and blends as they were last read.
     pub shelf: Cache<String, Arc<Shelved>>,
-    /// Panoramas as they were last read.
-    pub panoramas: Cache<String, Surroundings>,
+    /// Environments as they were last read.
+    pub environments: Environments,
+    /// Uploads that nothing names yet.
+    pub uploading: Uploading,
     ready: AtomicBool,
     stopping: watch::Sender<bool>,
     /// Held open: the lock on the data folder.
@@ -102,10 +105,7 @@ impl App {
             .max_capacity(config.memory_bytes / 4)
             .weigher(|_, shelved: &Arc<Shelved>| shelved.weight())
             .build();
-        let panoramas = Cache::builder()
-            .max_capacity(config.memory_bytes / 4)
-            .weigher(|_, surroundings: &Surroundings| surroundings.weight())
-            .build();
+        let environments = Environments::new(config.memory_bytes / 4);
         let processors = rayon::current_num_threads();
         Ok(Self(Arc::new(Shared {
             works,
@@ -119,7 +119,8 @@ impl App {
             removal: RwLock::new(()),
             reading: Mutex::new(()),
             shelf,
-            panoramas,
+            environments,
+            uploading: Uploading::default(),
             ready: AtomicBool::new(false),
             stopping: watch::Sender::new(false),
             _lock: lock,

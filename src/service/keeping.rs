@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use super::app::App;
+use super::environments::unknown_environment;
 use super::http::Problem;
 use super::shelf::unknown_paint;
 use super::work::{Thing, colors};
 use crate::paint::PaintFile;
-use crate::store::{BlobBytes, Hash, PaintRecord, Visibility};
+use crate::store::{BlobBytes, EnvironmentRecord, Hash, PaintRecord, Visibility};
 
 impl App {
     /// Whether a paint has this id.
@@ -108,6 +109,36 @@ impl App {
         Ok(())
     }
 
+    /// A blob that the record of an environment names, to be streamed.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the environment was deleted a moment ago.
+    pub async fn stream_of_environment(
+        &self,
+        record: &EnvironmentRecord,
+    ) -> Result<BlobBytes, Problem> {
+        let (_reading, id) = (self.removal.read().await, &record.id);
+        match self.blobs.stream(record.file).await? {
+            Some(bytes) => Ok(bytes),
+            None if self.catalogue.environment(id).await?.is_none() => Err(unknown_environment(id)),
+            None => Err(Problem::internal(format!("the file of {id} is not there"))),
+        }
+    }
+
+    /// Forgets an environment, and its file unless something else names it.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when there is none.
+    pub async fn forget_environment(&self, id: &str) -> Result<(), Problem> {
+        let _removing = self.removal.write().await;
+        let gone = self.catalogue.remove_environment(id).await?;
+        let gone = gone.ok_or_else(|| unknown_environment(id))?;
+        self.environments.forget(id);
+        self.forget_unnamed(gone.file).await
+    }
+
     /// Publishes a paint or makes it private.
     ///
     /// # Errors
@@ -124,7 +155,7 @@ impl App {
         Ok(())
     }
 
-    /// Forgets an upload that came to nothing.
+    /// Forgets an upload that came to nothing: its blob goes, unless something names it or it is just uploaded again.
     ///
     /// # Errors
     ///
@@ -135,7 +166,7 @@ impl App {
     }
 
     async fn forget_unnamed(&self, blob: Hash) -> Result<(), Problem> {
-        if !self.catalogue.names_blob(blob).await? {
+        if !self.uploading.spares(blob) && !self.catalogue.names_blob(blob).await? {
             self.blobs.remove(blob).await?;
         }
         Ok(())

@@ -8,14 +8,15 @@
 //! | `resources` | one file per resource: paints, blends, realisations, previews, jobs … |
 //! | `work` | what computes: the workshop, places to compute at, jobs |
 //! | `app` | what all handlers share: the store, the work, the counts |
-//! | `shelf`, `keeping` | paints and blends as they are read, kept and removed |
-//! | `surroundings` | panoramas as pictures are lit with them |
+//! | `shelf`, `keeping`, `uploading` | paints and blends as they are read, kept and removed, and uploads until they are named |
+//! | `environments` | environments as pictures are lit with them |
 //!
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
 //! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`),
 //! who calls: whoever reaches the service may do all it does, and what is private is only left out of lists.
 
 mod app;
+mod environments;
 mod http;
 mod ids;
 mod keeping;
@@ -25,14 +26,13 @@ mod resources;
 mod samples;
 mod serve;
 mod shelf;
-mod surroundings;
+mod uploading;
 mod work;
 
 pub use app::App;
 pub use resources::docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
-pub use surroundings::Surroundings;
 pub use work::{
     Asked, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Picked, Picture,
     PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing, View, WorkError,
@@ -51,7 +51,7 @@ pub struct ServiceConfig {
     pub data: PathBuf,
     /// Limits on everything untrusted.
     pub limits: Limits,
-    /// Memory for results, paints, blends and panoramas, bytes.
+    /// Memory for results, paints, blends and environments, bytes.
     pub memory_bytes: u64,
     /// Disk for results, bytes.
     pub disk_bytes: u64,

@@ -115,7 +115,7 @@ fn resources() -> Router<App> {
         .route("/v1/blends/{id}/preview.{format}", get(previews::of_blend))
         .route(
             "/v1/environments",
-            axum::routing::post(environments::upload),
+            get(environments::list).post(environments::upload),
         )
         .route(
             "/v1/environments/{id}",

@@ -81,6 +81,17 @@ pub struct EnvironmentRecord {
     pub height: u32,
     /// Blob of the file.
     pub file: Hash,
+    /// What of its light is not drawn as bright as it was, a JSON object; `None` where all of it is.
+    pub held: Option<String>,
+}
+
+/// A page of environments, in the order they came.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EnvironmentPage {
+    /// The environments.
+    pub environments: Vec<EnvironmentRecord>,
+    /// Where the next page begins; `None` after the last.
+    pub next: Option<i64>,
 }
 
 /// What a job makes.
@@ -202,6 +213,9 @@ pub trait Environments: Send + Sync {
 
     /// The panorama of this id.
     fn environment<'a>(&'a self, id: &'a str) -> Task<'a, Option<EnvironmentRecord>>;
+
+    /// Up to `limit` panoramas from `cursor` on.
+    fn environments(&self, cursor: Option<i64>, limit: u32) -> Task<'_, EnvironmentPage>;
 
     /// Removes a panorama and hands out what was on record.
     fn remove_environment<'a>(&'a self, id: &'a str) -> Task<'a, Option<EnvironmentRecord>>;

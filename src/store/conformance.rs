@@ -291,19 +291,49 @@ async fn environments_conform(catalogue: &dyn Catalogue) {
         width: 1024,
         height: 512,
         file: Hash::of(b"sky"),
+        held: Some(r#"{"negative":3}"#.to_owned()),
     };
-    assert!(!catalogue.names_blob(sky.file).await.expect("asks"));
+    let named = async |blob| catalogue.names_blob(blob).await.expect("asks");
+    assert!(!named(sky.file).await);
     assert!(catalogue.add_environment(&sky).await.expect("adds"));
-    assert!(!catalogue.add_environment(&sky).await.expect("adds nothing"));
-    assert!(catalogue.names_blob(sky.file).await.expect("asks"));
+    let other = EnvironmentRecord {
+        format: "exr".to_owned(),
+        width: 8,
+        file: Hash::of(b"other"),
+        held: None,
+        ..sky.clone()
+    };
+    assert!(
+        !catalogue
+            .add_environment(&other)
+            .await
+            .expect("adds nothing")
+    );
+    assert!(named(sky.file).await && !named(other.file).await);
     let found = catalogue.environment("e_1").await.expect("reads");
-    assert_eq!(found.as_ref(), Some(&sky));
+    assert_eq!(found.as_ref(), Some(&sky), "the first stays as it was");
     assert!(catalogue.environment("e_2").await.expect("reads").is_none());
+
+    let list = async |cursor, limit| {
+        let page = catalogue.environments(cursor, limit).await.expect("lists");
+        (page.environments, page.next)
+    };
+    let other = EnvironmentRecord {
+        id: "e_0".to_owned(),
+        ..other
+    };
+    assert!(catalogue.add_environment(&other).await.expect("adds"));
+    let (first, next) = list(None, 1).await;
+    assert_eq!(first, std::slice::from_ref(&sky));
+    assert!(next.is_some());
+    assert_eq!(list(next, 1).await, (vec![other.clone()], None));
+    assert_eq!(list(None, 9).await, (vec![sky.clone(), other], None));
+
     let gone = catalogue.remove_environment("e_1").await.expect("removes");
     assert_eq!(gone, Some(sky.clone()));
     let gone = catalogue.remove_environment("e_1").await.expect("removes");
     assert_eq!(gone, None);
-    assert!(!catalogue.names_blob(sky.file).await.expect("asks"));
+    assert!(!named(sky.file).await);
 }
 
 /// What [`JobBook`] promises, on a catalogue without unfinished jobs.

@@ -24,8 +24,9 @@ mod whole_file;
 
 pub use blobs::{BlobBytes, BlobWriter, Blobs, Hash, LocalBlob, Stored, Task};
 pub use catalogue::{
-    BlendRecord, Blends, Catalogue, EnvironmentRecord, Environments, JobBook, JobKind, JobRecord,
-    JobState, NewJob, NotedPaint, PaintPage, PaintRecord, Paints, Submitted, Visibility,
+    BlendRecord, Blends, Catalogue, EnvironmentPage, EnvironmentRecord, Environments, JobBook,
+    JobKind, JobRecord, JobState, NewJob, NotedPaint, PaintPage, PaintRecord, Paints, Submitted,
+    Visibility,
 };
 pub use error::StoreError;
 pub use folder::FolderBlobs;

@@ -23,7 +23,7 @@ mod target;
 mod thing;
 
 pub use crate::export::{Gloss, Readings};
-pub use crate::render::{Environment, EnvironmentError, Shape};
+pub use crate::render::{Environment, EnvironmentError, EnvironmentFile, EnvironmentFormat, Shape};
 pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
 
-use super::realising::{Made, choose, error_of};
+use super::realising::{Made, check, choose, error_of};
 use super::{Thing, WorkshopError, read};
 use crate::blend::RealisationWeights;
 use crate::paint::{CarPaint, Limits};
@@ -120,7 +120,9 @@ impl PictureFormat {
 /// [`WorkshopError`] for a file that cannot be read or is no `.hdr` or `.exr` picture.
 pub fn read_environment(path: &Path, limits: &Limits) -> Result<Environment, WorkshopError> {
     let bytes = read(path, limits)?;
-    Environment::from_bytes(&bytes, limits).map_err(|e| WorkshopError::input(path.display(), e))
+    Environment::from_bytes(&bytes, limits)
+        .map(|file| file.environment)
+        .map_err(|e| WorkshopError::input(path.display(), e))
 }
 
 /// Draws a paint, or a blend at the given weights, or the aspecular angles in place of either.
@@ -138,6 +140,7 @@ pub fn preview(
 ) -> Result<Made, WorkshopError> {
     let scene = scene_of(options);
     if options.show == Show::Aspecular {
+        check(thing, weights)?;
         return angles(&scene, format, limits, progress);
     }
     let chosen = choose(thing, weights)?;
@@ -147,21 +150,27 @@ pub fn preview(
         PictureFormat::Exr => rendering.film.to_exr(),
     }
     .map_err(WorkshopError::internal)?;
-    let mut report = json!({
+    let report = json!({
         "realisation": chosen.report,
         "rendering": rendering.report,
         "error": error_of(thing, weights),
     });
-    let mut notes = chosen.notes;
-    if let Some(line) = scene.environment.held().line() {
-        report["environment"] = json!(scene.environment.held());
-        notes.push(line);
-    }
-    Ok(Made {
+    let made = Made {
         bytes,
         report,
-        notes,
-    })
+        notes: chosen.notes,
+    };
+    Ok(with_held(made, &scene))
+}
+
+/// The same with what of the surroundings is not drawn as bright as it was.
+fn with_held(mut made: Made, scene: &Scene) -> Made {
+    let held = scene.environment.held();
+    if let Some(line) = held.line() {
+        made.report["environment"] = json!(held);
+        made.notes.push(line);
+    }
+    made
 }
 
 /// The map of aspecular angles. No paint is looked at: it would be the same for all.
@@ -177,11 +186,12 @@ fn angles(
         PictureFormat::Exr => map.to_exr(),
     }
     .map_err(WorkshopError::internal)?;
-    Ok(Made {
+    let made = Made {
         bytes,
         report: json!({ "aspecular": map.report() }),
         notes: Vec::new(),
-    })
+    };
+    Ok(with_held(made, scene))
 }
 
 /// What the samples of a picture will leave to chance.

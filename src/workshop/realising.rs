@@ -109,12 +109,23 @@ pub(super) fn choose(
             report: json!({ "paint": file.name, "warnings": file.warnings }),
             notes: Vec::new(),
         }),
-        Thing::Blend(blend) => {
-            let weights =
-                weights.ok_or_else(|| WorkshopError::usage("weights", "a blend needs weights"))?;
-            of_blend(blend, weights)
-        }
+        Thing::Blend(blend) => of_blend(blend, needed(weights)?),
     }
+}
+
+/// Refuses the weights that [`choose`] refuses, and realises nothing.
+pub(super) fn check(
+    thing: &Thing,
+    weights: Option<&RealisationWeights>,
+) -> Result<(), WorkshopError> {
+    match thing {
+        Thing::Paint(_) => Ok(()),
+        Thing::Blend(blend) => Ok(blend.check(needed(weights)?)?),
+    }
+}
+
+fn needed(weights: Option<&RealisationWeights>) -> Result<&RealisationWeights, WorkshopError> {
+    weights.ok_or_else(|| WorkshopError::usage("weights", "a blend needs weights"))
 }
 
 fn of_blend(blend: &Blend, weights: &RealisationWeights) -> Result<Chosen, WorkshopError> {

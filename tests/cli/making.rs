@@ -258,4 +258,42 @@ fn angles_are_drawn_the_same_for_every_paint_and_take_no_samples() {
             "{said}"
         );
     }
+    desk.ok(&[
+        "blend",
+        "sample:white",
+        "sample:blue",
+        "--profile",
+        "draft",
+        "--out",
+        "two.blend",
+    ]);
+    desk.ok(&draw("two.blend", "e.png", &["--weights", "0.5,0.5"]));
+    assert_eq!(desk.read("e.png"), desk.read("a.png"));
+    let said = desk.refused(2, &draw("two.blend", "d.png", &["--weights", "1"]));
+    assert!(said.contains("weights has 1 numbers"), "{said}");
+    for (input, option, more) in [
+        (
+            "sample:white",
+            "samples_per_pixel=400",
+            ["--knob", "samples_per_pixel=400"],
+        ),
+        (
+            "sample:white",
+            "samples_per_pixel=9",
+            ["--profile", "draft,samples_per_pixel=9"],
+        ),
+        ("two.blend", "--profile", ["--profile", "reference"]),
+        ("two.blend", "--profile", ["--knob", "precision=f32"]),
+    ] {
+        let weights: &[&str] = if input == "two.blend" {
+            &["--weights", "0.5,0.5"]
+        } else {
+            &[]
+        };
+        let said = desk.refused(2, &[&draw(input, "d.png", &more)[..], weights].concat());
+        assert!(
+            said.contains(option) && said.contains("--show aspecular"),
+            "{said}"
+        );
+    }
 }

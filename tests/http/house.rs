@@ -13,7 +13,7 @@ use carpaint::service::{
     Progress, Readings, ServiceConfig, Target, Thing, View, WorkError, Works, Workshop, open,
     serve,
 };
-use carpaint::workshop::EstimatedError;
+use carpaint::workshop::{Environment, EstimatedError};
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
@@ -135,6 +135,7 @@ impl Works for Pretend {
         thing: &Thing,
         weights: Option<&RealisationWeights>,
         view: &View,
+        _: Option<&Environment>,
         format: PictureFormat,
         progress: Progress<'_>,
     ) -> Result<Picture, WorkError> {

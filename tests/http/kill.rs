@@ -143,6 +143,11 @@ async fn the_same_bytes_come_after_a_kill_and_a_term_ends_it_quietly() {
     )
     .await;
     let blend = blend.header("location").expect("an address").to_owned();
+    let mut sky = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n".to_vec();
+    sky.extend([60, 80, 128, 128].repeat(32));
+    let lit = ask(program.address, "POST", "/v1/environments", &[], &sky).await;
+    assert_eq!(lit.status, 201, "{lit:?}");
+    let lit = lit.json()["id"].as_str().expect("an id").to_owned();
     let paths: Vec<String> = [
         "realisation.zip?",
         "realisation.json?",
@@ -151,7 +156,16 @@ async fn the_same_bytes_come_after_a_kill_and_a_term_ends_it_quietly() {
     ]
     .iter()
     .map(|what| format!("{blend}/{what}weights=0.25,0.75"))
-    .chain([blend.clone(), format!("/v1/paints/{}", ids[0])])
+    .chain([
+        blend.clone(),
+        format!("/v1/paints/{}", ids[0]),
+        format!("/v1/environments/{lit}"),
+        format!("/v1/environments/{lit}/file"),
+        format!(
+            "/v1/paints/{}/preview.png?size=24x16&spp=2&environment={lit}",
+            ids[0]
+        ),
+    ])
     .collect();
     let mut before = Vec::new();
     for path in &paths {

@@ -13,6 +13,7 @@ mod house;
 mod interface;
 mod jobs;
 mod kill;
+mod lit;
 mod nearest;
 mod paints;
 mod previews;

@@ -110,17 +110,22 @@ async fn angles_are_the_same_for_every_paint_and_other_than_the_paint() {
     for same in [
         format!("/v1/paints/{}/preview.png?{query}", paints[1]),
         format!("/v1/blends/{blend}/preview.png?{query}&weights=0.2,0.8"),
-        format!(
-            "/v1/paints/{}/preview.png?{query}&light=-0.84,1,2",
-            paints[0]
-        ),
+        // The studio's key is stronger than any light of usual strength, wherever that is.
+        format!("/v1/paints/{}/preview.png?{query}&light=0,0,1", paints[0]),
     ] {
         assert!(of(&same).await.body == png.body, "{same}");
     }
-    for other in ["size=48x32&spp=1", "size=48x32&show=aspecular&light=0,0,1"] {
-        let path = format!("/v1/paints/{}/preview.png?{other}", paints[0]);
-        assert!(of(&path).await.body != png.body, "{other}");
-    }
+    let path = format!("/v1/paints/{}/preview.png?size=48x32&spp=1", paints[0]);
+    assert!(of(&path).await.body != png.body, "the paint");
+    let strong = json!({
+        "paint": paints[0], "size": [48, 32], "show": "aspecular",
+        "lights": [{"towards": [0, 0, 1]}, {"towards": [0, 1, 1], "irradiance": [5, 5, 5]}],
+    });
+    let strong = house.post_json("/v1/previews", &strong.to_string()).await;
+    assert!(
+        strong.status == 200 && strong.body != png.body,
+        "a stronger light"
+    );
     let posted = json!({"paint": paints[0], "size": [48, 32], "show": "aspecular"});
     let posted = house.post_json("/v1/previews", &posted.to_string()).await;
     assert!(posted.body == png.body, "posted");
@@ -128,7 +133,12 @@ async fn angles_are_the_same_for_every_paint_and_other_than_the_paint() {
     assert!(exr.body.windows(14).any(|at| at == b"aspecular_deg\0"));
     let report = of(&format!("/v1/paints/{}/preview.json?{query}", paints[0])).await;
     let map = &report.json()["aspecular"];
-    assert_eq!(map["main_light"], "directional_light");
+    assert_eq!(map["main_light"], "environment");
+    let candidates = map["candidates"].as_array().expect("candidates");
+    let lights: Vec<_> = candidates.iter().map(|of| &of["light"]).collect();
+    assert_eq!(lights, ["directional_light", "environment"]);
+    let strength = |k: usize| candidates[k]["irradiance"][1].as_f64().expect("light");
+    assert!(strength(0) < strength(1), "{map}");
     let borders: Vec<f64> = map["bands"]
         .as_array()
         .expect("bands")

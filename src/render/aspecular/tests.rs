@@ -37,6 +37,7 @@ fn a_light_behind_the_eye_is_mirrored_in_the_middle_of_a_ball() {
     scene.camera.origin = [0.0, 0.0, 7.0];
     scene.camera.target = [0.0; 3];
     scene.lights[0].towards = [0.0, 0.0, 2.0];
+    scene.lights[0].irradiance = [2.0; 3];
     let map = map(&scene);
     let at = |x: usize, y: usize| map.degrees()[y * 65 + x];
     assert!(at(32, 32) < 0.1, "{}", at(32, 32));
@@ -82,16 +83,44 @@ fn bands_have_their_colors_and_the_background_is_the_pictures() {
 }
 
 #[test]
-fn without_lights_it_is_the_surroundings_main_light() {
-    let mut scene = Scene::new(Shape::Capsule, [24, 16]);
-    scene.lights.clear();
-    let of_studio = map(&scene);
-    assert_eq!(of_studio.report().main_light, MainLight::Environment);
-    scene.lights = vec![DirectionalLight {
-        towards: Environment::studio().main_direction(),
-        irradiance: [0.0; 3],
-    }];
-    assert_eq!(of_studio.degrees(), map(&scene).degrees());
+fn the_main_light_is_the_one_of_the_largest_irradiance() {
+    let towards = [0.3, 0.9, 0.1];
+    let light = |irradiance: f32| DirectionalLight {
+        towards,
+        irradiance: [irradiance; 3],
+    };
+    let studio = Environment::studio().main_light();
+    let bright = studio.irradiance[0];
+    for (lights, main) in [
+        (vec![], MainLight::Environment),
+        (vec![light(0.99 * bright)], MainLight::Environment),
+        (vec![light(1.01 * bright)], MainLight::DirectionalLight),
+        (
+            vec![light(0.0), light(2.0 * bright)],
+            MainLight::DirectionalLight,
+        ),
+    ] {
+        let mut scene = Scene::new(Shape::Capsule, [24, 16]);
+        scene.lights = lights;
+        let told = map(&scene);
+        let want = match main {
+            MainLight::Environment => studio.towards,
+            MainLight::DirectionalLight => unit(towards),
+        };
+        let report = told.report();
+        assert_eq!((report.main_light, report.towards), (main, want));
+        assert_eq!(report.candidates.len(), scene.lights.len() + 1);
+        let last = report.candidates[scene.lights.len()];
+        assert_eq!(last.light, MainLight::Environment);
+        assert_eq!(last.irradiance, studio.irradiance);
+        // Alone, the same light gives the same angles.
+        scene.environment = Environment::uniform([1.0; 3]);
+        scene.lights = vec![DirectionalLight {
+            towards: want,
+            irradiance: [0.1; 3],
+        }];
+        assert_eq!(told.degrees(), map(&scene).degrees());
+    }
 }
 
 #[test]

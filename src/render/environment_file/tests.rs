@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::render::film::write_exr;
-use exr::image::{Blocks, Encoding, Image, Layer, SpecificChannels};
+use exr::image::{
+    AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image, Layer, SpecificChannels,
+};
 use exr::math::Vec2;
 use exr::meta::attribute::LineOrder;
 use exr::meta::header::LayerAttributes;
@@ -34,13 +36,13 @@ fn sky(bad: f32) -> Vec<u8> {
 #[test]
 fn both_formats_are_read() {
     let limits = Limits::default();
-    let up = Environment::from_bytes(&sky(0.5), &limits)
-        .expect("exr")
-        .radiance([0.0, 1.0, 0.0]);
+    let read = |bytes: &[u8]| Environment::from_bytes(bytes, &limits).expect("reads");
+    let (exr, hdr) = (read(&sky(0.5)), read(&hdr()));
+    assert_eq!((exr.format, exr.size), (EnvironmentFormat::Exr, [8, 4]));
+    assert_eq!((hdr.format, hdr.size), (EnvironmentFormat::Hdr, [8, 4]));
+    let up = exr.environment.radiance([0.0, 1.0, 0.0]);
     assert!((up[0] - 0.5).abs() < 1e-6 && (up[2] - 2.0).abs() < 1e-6);
-    let somewhere = Environment::from_bytes(&hdr(), &limits)
-        .expect("hdr")
-        .radiance([0.0, 0.2, 0.9]);
+    let somewhere = hdr.environment.radiance([0.0, 0.2, 0.9]);
     assert!((somewhere[2] - 2.0).abs() < 0.02);
 }
 
@@ -63,7 +65,8 @@ fn pixels_that_are_no_light_are_refused_or_held_and_counted() {
             Some("1 channels above 65504, up to 1000000, are drawn as 65504"),
         ),
     ] {
-        let sky = Environment::from_bytes(&sky(light), &limits).expect("held");
+        let sky = Environment::from_bytes(&sky(light), &limits);
+        let sky = sky.expect("held").environment;
         let told = told.map(|what| format!("environment: {what}"));
         assert_eq!(sky.held().line(), told);
         assert!(sky.level().is_finite() && sky.level() >= 0.0);
@@ -81,6 +84,124 @@ fn sizes_are_checked_before_anything_is_allocated() {
             Environment::from_bytes(&bytes, &limits),
             Err(EnvironmentError::Size { .. })
         ));
+    }
+}
+
+/// An 8 x 4 picture of so many channels of 32-bit floats, B, G and R among them.
+fn of_channels(count: usize) -> Vec<u8> {
+    let name = |k: usize| match k {
+        0..3 => ["B", "G", "R"][k].to_owned(),
+        _ => format!("of {k}"),
+    };
+    let channel = |k| AnyChannel::new(&*name(k), FlatSamples::F32(vec![1.0; 32]));
+    let channels = AnyChannels::sort((0..count).map(channel).collect());
+    let layer = Layer::new(
+        (8, 4),
+        LayerAttributes::named("sky"),
+        Encoding::FAST_LOSSLESS,
+        channels,
+    );
+    let mut bytes = Cursor::new(Vec::new());
+    Image::from_layer(layer)
+        .write()
+        .non_parallel()
+        .to_buffered(&mut bytes)
+        .expect("encodes");
+    bytes.into_inner()
+}
+
+/// The same file with other corners in its windows.
+fn with_windows(mut bytes: Vec<u8>, data: [i32; 4], display: [i32; 4]) -> Vec<u8> {
+    for (name, corners) in [("dataWindow", data), ("displayWindow", display)] {
+        let head = format!("{name}\0box2i\0\x10\0\0\0");
+        let places = bytes
+            .windows(head.len())
+            .position(|at| at == head.as_bytes());
+        let place = places.expect("a window") + head.len();
+        for (k, corner) in corners.into_iter().enumerate() {
+            bytes[place + 4 * k..][..4].copy_from_slice(&corner.to_le_bytes());
+        }
+    }
+    bytes
+}
+
+#[test]
+fn a_header_that_claims_more_memory_than_a_table_may_have_is_refused() {
+    let claimed = [0, 0, 11583, 5791];
+    let hungry = with_windows(of_channels(64), claimed, claimed);
+    let limits = Limits::default();
+    let error = Environment::from_bytes(&hungry, &limits).expect_err("17 GB");
+    let told = error.to_string();
+    let bytes: u64 = 11584 * 5792 * 64 * 4;
+    assert!(
+        told.contains(&bytes.to_string()) && told.contains(&limits.table_bytes.to_string()),
+        "{told}"
+    );
+    // At the limit it is read, a byte below it is not.
+    let small = of_channels(40);
+    let enough = Limits {
+        table_bytes: 8 * 4 * 40 * 4,
+        ..Limits::default()
+    };
+    assert!(Environment::from_bytes(&small, &enough).is_ok());
+    let short = Limits {
+        table_bytes: enough.table_bytes - 1,
+        ..enough
+    };
+    let error = Environment::from_bytes(&small, &short).expect_err("a byte short");
+    assert!(matches!(error, EnvironmentError::Bytes { .. }), "{error}");
+
+    let error = Environment::from_bytes(&of_channels(65), &limits).expect_err("too many");
+    assert_eq!(
+        error.to_string(),
+        "65 channels are more than the 64 accepted"
+    );
+}
+
+#[test]
+fn what_is_not_a_whole_panorama_is_refused_by_its_name() {
+    let limits = Limits::default();
+    let of = |width: u32, height: u32| {
+        let light = (1.0_f32, 1.0_f32, 1.0_f32);
+        let bytes = write_exr(width, height, |_| light).expect("encodes");
+        Environment::from_bytes(&bytes, &limits)
+    };
+    for (width, height) in [(8, 4), (9, 4), (7, 4), (1, 1), (2, 1)] {
+        let read = of(width, height).expect("a panorama within a pixel");
+        assert_eq!(read.size, [width, height]);
+    }
+    for (width, height) in [(8, 8), (10, 4), (6, 4), (4, 8)] {
+        let told = of(width, height).expect_err("no panorama").to_string();
+        let accepted = format!("{} x {height}", 2 * height);
+        assert!(
+            told.starts_with(&format!("{width} x {height} ")) && told.contains(&accepted),
+            "{told}"
+        );
+    }
+    let whole = of_channels(3);
+    let shifted = with_windows(whole.clone(), [4, 2, 11, 5], [4, 2, 11, 5]);
+    assert!(Environment::from_bytes(&shifted, &limits).is_ok());
+    let part = with_windows(whole, [4, 2, 11, 5], [0, 0, 15, 7]);
+    let told = Environment::from_bytes(&part, &limits).expect_err("a part");
+    assert_eq!(
+        told.to_string(),
+        "the data window 8 x 4 at 4, 2 is not the display window 16 x 8 at 0, 0: a panorama has all its pixels and no others"
+    );
+}
+
+#[test]
+fn light_too_dim_to_expose_for_is_refused_and_none_is_not() {
+    let limits = Limits::default();
+    let of = |light: f32| {
+        let bytes = write_exr(8, 4, |_| (light, light, light)).expect("encodes");
+        Environment::from_bytes(&bytes, &limits)
+    };
+    for light in [0.0, 1e-29] {
+        assert!(of(light).is_ok(), "{light}");
+    }
+    for light in [1e-31, 1e-42] {
+        let error = of(light).expect_err("too dim");
+        assert!(matches!(error, EnvironmentError::Dark { .. }), "{error}");
     }
 }
 
@@ -108,7 +229,7 @@ fn cut_and_damaged_files_are_errors_or_pictures_never_panics() {
     }
 }
 
-/// The same 24 x 17 sky in every way of storing that is read: compression, and blocks as lines or as tiles.
+/// The same 34 x 17 sky in every way of storing that is read: compression, and blocks as lines or as tiles.
 fn stored() -> Vec<(String, Vec<u8>)> {
     let compressions = [
         Compression::Uncompressed,
@@ -139,7 +260,7 @@ fn stored() -> Vec<(String, Vec<u8>)> {
                 line_order: LineOrder::Increasing,
             };
             let channels = SpecificChannels::rgb(pixel);
-            let layer = Layer::new((24, 17), LayerAttributes::named("sky"), encoding, channels);
+            let layer = Layer::new((34, 17), LayerAttributes::named("sky"), encoding, channels);
             let mut bytes = Cursor::new(Vec::new());
             Image::from_layer(layer)
                 .write()
@@ -158,6 +279,7 @@ fn every_compression_in_lines_and_tiles_reads_as_the_same_sky() {
     let level = |bytes: &[u8]| {
         Environment::from_bytes(bytes, &limits)
             .expect("reads")
+            .environment
             .level()
     };
     let all = stored();

@@ -8,6 +8,7 @@ use futures::StreamExt;
 
 use super::kind::Kind;
 use super::problem::{Place, Problem};
+use crate::paint::Limits;
 use crate::service::app::App;
 use crate::store::BlobWriter;
 
@@ -37,7 +38,7 @@ pub struct Expected {
 /// # Errors
 ///
 /// [`Problem`] for a form, an encoding, or a length beyond the limit.
-pub fn check_headers(app: &App, headers: &HeaderMap) -> Result<(), Problem> {
+pub fn check_headers(app: &App, expected: &Expected, headers: &HeaderMap) -> Result<(), Problem> {
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     if text(header::CONTENT_TYPE).is_some_and(|kind| kind.starts_with("multipart/")) {
         let problem = Problem::new(
@@ -59,10 +60,22 @@ pub fn check_headers(app: &App, headers: &HeaderMap) -> Result<(), Problem> {
     let announced: u64 = text(header::CONTENT_LENGTH)
         .and_then(|length| length.parse().ok())
         .unwrap_or(0);
-    if announced > app.config.limits.bytes {
-        Err(too_large(app.config.limits.bytes))
+    let most = expected.most(&app.config.limits);
+    if announced > most {
+        Err(too_large(most))
     } else {
         Ok(())
+    }
+}
+
+impl Expected {
+    /// Most bytes of one.
+    fn most(&self, limits: &Limits) -> u64 {
+        if self.archive {
+            limits.bytes
+        } else {
+            limits.bytes.min(limits.table_bytes)
+        }
     }
 }
 
@@ -98,7 +111,7 @@ pub async fn receive(
     let mut writer = app.blobs.begin().await?;
     let mut pieces = body.into_data_stream();
     let (mut length, begun) = (0, Instant::now());
-    let mut most = app.config.limits.bytes;
+    let mut most = expected.most(&app.config.limits);
     loop {
         let piece = match tokio::time::timeout(SILENCE, pieces.next()).await {
             Ok(None) => break,
@@ -117,7 +130,7 @@ pub async fn receive(
                 return Err(Problem::new(Kind::RequestTimeout, detail));
             }
         };
-        if length == 0 && !piece.is_empty() && !(expected.archive && piece.starts_with(b"P")) {
+        if length == 0 && !piece.is_empty() && !piece.starts_with(b"P") {
             most = most.min(app.config.limits.table_bytes);
         }
         length += piece.len() as u64;

@@ -1,9 +1,9 @@
-//! What requests for several resources ask for in the same words: accuracy, targets, weights,
-//! views.
+//! What requests for several resources ask for in the same words: accuracy, targets, weights, views, pages.
 //!
 //! Promised: a refusal names the parameter or the field and what would be accepted. Left to others: what it means
 //! (`accuracy`, `blend`), and what is done with it (`resources`).
 
+pub mod page;
 mod profile;
 pub mod targets;
 pub mod view;

@@ -11,17 +11,14 @@ use super::targets;
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
+use crate::service::environments::{self, STUDIO, Unread};
 use crate::service::http::{Place, Problem};
 use crate::service::shelf::Shelved;
-use crate::service::surroundings::Surroundings;
 use crate::service::work::{Asked, Light, Picked, PictureFormat, Shape, Show, View, WorkError};
 use crate::workshop::MOST_SAMPLES;
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u32 = 4096;
-
-/// Name of the built-in environment.
-const STUDIO: &str = "studio";
 
 /// Most lights of a scene.
 const MOST_LIGHTS: usize = 16;
@@ -45,7 +42,8 @@ pub struct ViewQuery {
     /// one, unless given. A panorama is all the light there is unless `light` is given.
     #[param(pattern = "^(studio|e_[0-9a-f]{32})$", example = "studio")]
     environment: Option<String>,
-    /// Direction towards the light, in place of the scene's usual one: x to the right, y up, z towards the viewer.
+    /// Direction towards the light, in place of the scene's usual one: x to the right, y up, z towards the viewer. Angles
+    /// are told for the strongest light, which the built-in studio's key is beside one of usual strength.
     #[param(style = Form, explode = false, min_items = 3, max_items = 3)]
     light: Option<Vec<f32>>,
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `draft,samples_per_pixel=100`.
@@ -97,7 +95,7 @@ impl ViewQuery {
         &self,
         app: &App,
         spp: Option<u32>,
-        environment: Option<Surroundings>,
+        environment: Option<String>,
     ) -> Result<View, Problem> {
         let Size(size) = self.size.unwrap_or(Size([512, 512]));
         let profile = self.profile.clone().unwrap_or_default().of_query()?;
@@ -147,7 +145,7 @@ impl ViewQuery {
         }
         let knobs = self.profile.is_some() || self.spp.is_some();
         let target = targets::of_query(self.max_error, self.max_seconds, knobs)?;
-        let environment = surroundings(app, self.environment.as_deref(), &Names::QUERY).await?;
+        let environment = environment(app, self.environment.as_deref(), &Names::QUERY).await?;
         if !target.is_some() {
             return Ok((self.view(app, self.spp, environment)?, None));
         }
@@ -155,16 +153,19 @@ impl ViewQuery {
         let mut view = self.view(app, Some(1), environment)?;
         let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(thing), weights.cloned());
         let wanted = view.clone();
+        let unread = app.unread(view.environment.as_deref()).await?;
         let found = app.bench.run(move || {
+            let environment = unread.as_ref().map(Unread::read).transpose()?;
             let asked = Asked::Preview {
                 thing: &thing.thing,
                 weights: weights.as_ref(),
                 view: &wanted,
+                environment: environment.as_deref(),
                 format,
             };
-            works.pick(&asked, &target)
+            works.pick(&asked, &target).map_err(WorkError::of_query)
         });
-        let found = found.await?.map_err(WorkError::of_query)?;
+        let found = found.await??;
         view.samples_per_pixel = found.profile().samples_per_pixel;
         Ok((view, Some(found)))
     }
@@ -200,6 +201,14 @@ impl Names {
         problem.accepting(accepted)
     }
 
+    /// A problem with a parameter, where parameters stand.
+    fn own(&self, problem: Problem) -> Problem {
+        match self.place {
+            Place::Body => problem.in_body(),
+            _ => problem,
+        }
+    }
+
     fn light(&self, place: usize) -> String {
         match self.place {
             Place::Body => format!("{}/{place}", self.light),
@@ -208,25 +217,21 @@ impl Names {
     }
 }
 
-/// The panorama that is asked for; `None` for the built-in studio.
+/// The environment that is asked for, by its id; `None` for the built-in studio.
 ///
 /// # Errors
 ///
-/// [`Problem`] for an id that no panorama has.
-pub async fn surroundings(
+/// [`Problem`] for an id that no environment has.
+pub async fn environment(
     app: &App,
     asked: Option<&str>,
     names: &Names,
-) -> Result<Option<Surroundings>, Problem> {
-    let Some(id) = asked.filter(|id| *id != STUDIO) else {
-        return Ok(None);
-    };
-    let found = app.surroundings(id).await?;
-    found.map(Some).ok_or_else(|| {
-        let accepted = format!("{STUDIO}, or the id of an answer to POST /v1/environments");
-        let detail = format!("There is no environment {id:?}.");
-        names.refuse("environment", detail, accepted)
-    })
+) -> Result<Option<String>, Problem> {
+    match asked {
+        None | Some(STUDIO) => Ok(None),
+        Some(id) if app.has_environment(id).await? => Ok(Some(id.to_owned())),
+        Some(id) => Err(names.own(environments::not_offered(id))),
+    }
 }
 
 /// Samples per pixel of what is shown: those asked for, or the profile's; angles have none to choose.

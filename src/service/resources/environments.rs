@@ -2,24 +2,26 @@
 
 use axum::extract::{Request, State};
 use axum::http::StatusCode;
-use serde::Serialize;
-use utoipa::ToSchema;
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
 use crate::service::app::App;
+use crate::service::environments::PREFIX;
 use crate::service::http::{
     Address, Answer, EnvironmentProblems, Idempotency, Keep, Kind, NoQuery, Place, Problem,
-    ProblemDocument, Problems, receiving,
+    ProblemDocument, Problems, Query, receiving,
 };
 use crate::service::ids;
-use crate::service::surroundings::{PREFIX, unknown_environment};
+use crate::service::parameters::page;
 use crate::service::work::runner;
 use crate::store::{BlobWriter, EnvironmentRecord, Hash};
+use crate::workshop::{Environment, EnvironmentFile, EnvironmentFormat};
 
 /// What an upload is to be.
 const PANORAMA: receiving::Expected = receiving::Expected {
     archive: false,
     unusable: Kind::UnusableEnvironment,
-    accepted: "a latitude-longitude panorama, Radiance .hdr or OpenEXR .exr",
+    accepted: "a latitude-longitude panorama, twice as wide as high, Radiance .hdr or OpenEXR .exr",
 };
 
 /// A panorama.
@@ -36,8 +38,44 @@ pub struct EnvironmentDocument {
     pub height: u32,
     /// `hdr` or `exr`.
     pub format: String,
+    /// What of its light is not drawn as bright as it was; absent where all of it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held: Option<HeldLight>,
     /// Where it is, and its file.
     pub links: EnvironmentLinks,
+}
+
+/// Channels of a panorama's pixels that are held in the range of light that is drawn, 0 to 65504.
+#[derive(Debug, Serialize, Deserialize, ToSchema)]
+pub struct HeldLight {
+    /// Channels above it, which a bare sun reaches.
+    pub too_bright: u64,
+    /// The brightest of them, or 0.
+    pub brightest: f32,
+    /// Channels below 0, which resampling leaves beside bright lights.
+    pub negative: u64,
+    /// The lowest of them, or 0.
+    pub lowest: f32,
+}
+
+/// A page of panoramas.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct EnvironmentList {
+    /// The panoramas, in the order they came.
+    pub environments: Vec<EnvironmentDocument>,
+    /// Cursor of the next page; null after the last.
+    pub next: Option<String>,
+}
+
+/// Which panoramas to list.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ListQuery {
+    /// `next` of the page before.
+    cursor: Option<String>,
+    /// Most panoramas on the page, 50 unless given.
+    #[param(minimum = 1, maximum = 200)]
+    limit: Option<u32>,
 }
 
 /// Where a panorama is.
@@ -64,14 +102,18 @@ impl From<EnvironmentRecord> for EnvironmentDocument {
             width: record.width,
             height: record.height,
             format: record.format,
+            held: record
+                .held
+                .and_then(|held| serde_json::from_str(&held).ok()),
         }
     }
 }
 
 /// Upload a panorama that lights pictures.
 ///
-/// The body is the file itself, a latitude-longitude picture in linear light: Radiance `.hdr` or OpenEXR `.exr`. The
-/// same bytes have the same id. Pictures take it as `environment`.
+/// The body is the file itself, a latitude-longitude picture in linear light, twice as wide as high: Radiance `.hdr` or
+/// OpenEXR `.exr`. Pictures take it as `environment`. The same bytes have the same id, whoever uploads them: they are
+/// kept once, and a delete by one uploader is a delete for all.
 #[utoipa::path(
     post, operation_id = "upload_environment", path = "/v1/environments", tag = "environments",
     params(("Idempotency-Key" = Option<String>, Header, description = "Refuses this key with another request")),
@@ -91,7 +133,7 @@ pub async fn upload(
     request: Request,
 ) -> Result<Answer, Problem> {
     let (parts, body) = request.into_parts();
-    let asked = query.and_then(|_| receiving::check_headers(&app, &parts.headers));
+    let asked = query.and_then(|_| receiving::check_headers(&app, &PANORAMA, &parts.headers));
     let idempotency = match asked.and(idempotency) {
         Ok(idempotency) => idempotency,
         Err(problem) => {
@@ -117,15 +159,9 @@ async fn keep(
     received: Box<dyn BlobWriter>,
     idempotency: Idempotency,
 ) -> Result<(EnvironmentRecord, bool), Problem> {
-    let file = {
-        let _writing = app.removal.read().await;
-        received.finish().await?.hash
-    };
-    let kept = named(&app, file, &idempotency).await;
-    if kept.is_err() {
-        app.forget_upload(file).await?;
-    }
-    kept
+    let uploaded = app.uploaded(received).await?;
+    let kept = named(&app, uploaded.blob(), &idempotency).await;
+    uploaded.settle(kept).await
 }
 
 async fn named(
@@ -135,29 +171,66 @@ async fn named(
 ) -> Result<(EnvironmentRecord, bool), Problem> {
     let claimed = ids::asked("environment", &file.to_string());
     idempotency.claim(app, &claimed).await?;
-    // Not held while a place to compute is waited for.
-    let read = app.panorama_of(file).await?;
-    let _naming = app.removal.read().await;
-    // Who uploaded and deleted the same bytes meanwhile took them away.
-    let (Some(read), Some(_)) = (read, app.blobs.local(file).await?) else {
-        return Err(Problem::overloaded());
-    };
-    let (environment, format) = read.map_err(|error| {
-        let most = app.config.limits.pixels;
-        Problem::new(PANORAMA.unusable, error.to_string())
-            .at(Place::Body, "")
-            .accepting(format!("{}, up to {most} pixels", PANORAMA.accepted))
-    })?;
-    let [width, height] = environment.size().unwrap_or_default();
+    let id = ids::of_content(PREFIX, file);
+    if let Some(record) = app.catalogue.environment(&id).await? {
+        return Ok((record, false));
+    }
+    let read = read(app, file).await?;
+    let held = read.environment.held();
+    let held = (!held.is_none()).then(|| serde_json::to_string(held));
+    let [width, height] = read.size;
     let record = EnvironmentRecord {
-        id: ids::of_content(PREFIX, file),
-        format: format.to_owned(),
-        width: u32::try_from(width).map_err(Problem::internal)?,
-        height: u32::try_from(height).map_err(Problem::internal)?,
+        id,
+        format: read.format.ending().to_owned(),
+        width,
+        height,
         file,
+        held: held.transpose().map_err(Problem::internal)?,
     };
     let new = app.catalogue.add_environment(&record).await?;
     Ok((record, new))
+}
+
+/// Reads an upload as a panorama, from its file at a place to work at: who waits for one holds no bytes.
+async fn read(app: &App, file: Hash) -> Result<EnvironmentFile, Problem> {
+    let local = app.blobs.local(file).await?;
+    let local = local.ok_or_else(|| Problem::internal(format!("upload {file} is not there")))?;
+    let limits = app.config.limits;
+    let read = move || {
+        let bytes = std::fs::read(local.path()).map_err(Problem::internal)?;
+        Environment::from_bytes(&bytes, &limits).map_err(|error| {
+            Problem::new(PANORAMA.unusable, error.to_string())
+                .at(Place::Body, "")
+                .accepting(format!(
+                    "{}, up to {} pixels",
+                    PANORAMA.accepted, limits.pixels
+                ))
+        })
+    };
+    app.bench.run(read).await?
+}
+
+/// List panoramas, in the order they came.
+#[utoipa::path(
+    get, operation_id = "list_environments", path = "/v1/environments", tag = "environments", params(ListQuery),
+    responses(
+        (status = 200, description = "A page of environments", body = EnvironmentList),
+        Problems,
+    )
+)]
+pub async fn list(
+    State(app): State<App>,
+    Query(query): Query<ListQuery>,
+) -> Result<Answer, Problem> {
+    let limit = page::limit(query.limit)?;
+    let begin = page::begin(query.cursor.as_deref())?;
+    let page = app.catalogue.environments(begin, limit).await?;
+    let environments = page.environments.into_iter();
+    let list = EnvironmentList {
+        environments: environments.map(EnvironmentDocument::from).collect(),
+        next: page.next.map(page::cursor),
+    };
+    Ok(Answer::json(&list, Keep::Revalidated))
 }
 
 /// What is known about a panorama.
@@ -196,18 +269,18 @@ pub async fn file(
     _: NoQuery,
 ) -> Result<Answer, Problem> {
     let record = app.environment(&id).await?;
-    // An open blob can be read to its end, whatever becomes of its name.
-    let blob = app.blobs.stream(record.file).await?;
-    let blob = blob.ok_or_else(|| unknown_environment(&id))?;
-    let media_type = match record.format.as_str() {
-        "hdr" => "image/vnd.radiance",
-        _ => "image/x-exr",
-    };
-    Ok(Answer::blob(media_type, record.file, blob, Keep::Own)
-        .saved_as(&format!("{id}.{}", record.format)))
+    let blob = app.stream_of_environment(&record).await?;
+    let format = EnvironmentFormat::ALL
+        .into_iter()
+        .find(|format| format.ending() == record.format)
+        .ok_or_else(|| Problem::internal(format!("{id} is a file .{}", record.format)))?;
+    let answer = Answer::blob(format.media_type(), record.file, blob, Keep::Own);
+    Ok(answer.saved_as(&format!("{id}.{}", record.format)))
 }
 
 /// Delete a panorama. Pictures are no longer lit by it.
+///
+/// It is gone for everybody, also for others who uploaded the same bytes.
 #[utoipa::path(
     delete, operation_id = "delete_environment", path = "/v1/environments/{id}", tag = "environments",
     params(("id" = String, Path, description = "Environment")),
@@ -221,6 +294,6 @@ pub async fn delete(
     Address(id): Address<String>,
     _: NoQuery,
 ) -> Result<StatusCode, Problem> {
-    app.forget_environment(&id).await?;
+    runner::to_its_end(async move { app.forget_environment(&id).await }).await?;
     Ok(StatusCode::NO_CONTENT)
 }

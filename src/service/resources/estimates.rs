@@ -11,14 +11,16 @@ use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::PaintFile;
 use crate::service::app::App;
+use crate::service::environments::Unread;
 use crate::service::http::{Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument, Problems};
-use crate::service::parameters::view::{self, Side};
+use crate::service::parameters::view::{self, Names, Side};
 use crate::service::parameters::{ProfileDocument, ProfileText, targets};
 use crate::service::shelf::Shelved;
 use crate::service::work::{
     Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, Shape, Show, View, WorkError,
 };
 use crate::store::LocalBlob;
+use crate::workshop::Environment;
 
 /// Work to estimate.
 #[derive(Debug, Deserialize, ToSchema)]
@@ -41,6 +43,12 @@ pub struct EstimateOrder {
     /// Pixels across and down of a picture, 512 each unless given.
     #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
     size: Option<[u32; 2]>,
+    /// What a picture shows, `paint` unless given. `aspecular` takes neither `profile` nor `max_error` nor `max_seconds`.
+    show: Option<Show>,
+    /// Panorama that lights a picture, the id of an answer to `POST /v1/environments`; `studio`, the built-in one, unless
+    /// given.
+    #[schema(pattern = "^(studio|e_[0-9a-f]{32})$")]
+    environment: Option<String>,
     /// Accuracy: the name of a preset, or an object of knobs.
     #[schema(value_type = Option<ProfileDocument>)]
     profile: Option<ProfileText>,
@@ -93,7 +101,16 @@ pub struct EstimateDocument {
 enum Needed {
     Ingest(LocalBlob, Option<Layout>),
     Blend(Vec<Arc<Shelved>>),
-    Thing(Arc<Shelved>, Option<RealisationWeights>),
+    Realise(Arc<Shelved>, Option<RealisationWeights>),
+    Preview(Box<Picture>),
+}
+
+/// A picture to estimate.
+struct Picture {
+    of: Arc<Shelved>,
+    weights: Option<RealisationWeights>,
+    view: View,
+    unread: Option<Unread>,
 }
 
 /// Estimate a request.
@@ -117,36 +134,40 @@ pub async fn create(
     let target = targets::of_body(order.max_error, order.max_seconds, order.profile.is_some())?;
     let profile = order.profile.clone().unwrap_or_default().of_body()?;
     order.refuse_beside_the_point()?;
-    if let WorkName::Preview = order.work {
-        view::view(&app, order.view(&profile), &view::Names::BODY)?;
-    }
-    let needed = order.needed(&app).await?;
+    let needed = order.needed(&app, &profile).await?;
     let works = Arc::clone(&app.works);
     // The caller knows the paint, neither the file its upload is kept in nor the options it came with.
     let kept_in = match &needed {
         Needed::Ingest(local, _) => Some(local.path().display().to_string()),
         _ => None,
     };
-    let told = |error: WorkError| match &kept_in {
-        Some(file) => WorkError {
-            field: Some("paint".to_owned()),
-            ..error.without(file)
-        },
-        None => error,
+    let told = move |error: WorkError| {
+        WorkError::of_body(match &kept_in {
+            Some(file) => WorkError {
+                field: Some("paint".to_owned()),
+                ..error.without(file)
+            },
+            None => error,
+        })
     };
     let estimated = app.bench.run(move || {
-        order.with_asked(&needed, &profile, |asked| {
+        let estimate = |asked: &Asked<'_>| {
             if target.is_some() {
                 let picked = works.pick(asked, &target)?;
                 Ok((picked.estimate, Some(picked.met)))
             } else {
                 works.estimate(asked, &profile).map(|made| (made, None))
             }
-        })
+        };
+        let environment = match &needed {
+            Needed::Preview(picture) => picture.unread.as_ref().map(Unread::read),
+            _ => None,
+        };
+        let environment = environment.transpose().map_err(Problem::in_body)?;
+        let done = order.with_asked(&needed, environment.as_deref(), &profile, estimate);
+        done.map_err(told)
     });
-    let (estimate, met) = estimated
-        .await?
-        .map_err(|error| WorkError::of_body(told(error)))?;
+    let (estimate, met) = estimated.await??;
     Ok(Answer::json(
         &EstimateDocument::of(&estimate, met),
         Keep::Never,
@@ -178,16 +199,30 @@ impl EstimateOrder {
             ("format", self.format.is_some()),
             ("scene", self.scene.is_some()),
             ("size", self.size.is_some()),
+            ("show", self.show.is_some()),
+            ("environment", self.environment.is_some()),
         ];
         let (work, taken): (_, &[&str]) = match (self.work, &self.blend) {
             (WorkName::Ingest, _) => ("ingest", &["paint"]),
             (WorkName::Blend, _) => ("blend", &["paints"]),
             (WorkName::Realise, None) => ("realise, of a paint,", &["paint", "format"]),
             (WorkName::Realise, Some(_)) => ("realise", &["paint", "blend", "weights", "format"]),
-            (WorkName::Preview, None) => ("preview, of a paint,", &["paint", "scene", "size"]),
-            (WorkName::Preview, Some(_)) => {
-                ("preview", &["paint", "blend", "weights", "scene", "size"])
-            }
+            (WorkName::Preview, None) => (
+                "preview, of a paint,",
+                &["paint", "scene", "size", "show", "environment"],
+            ),
+            (WorkName::Preview, Some(_)) => (
+                "preview",
+                &[
+                    "paint",
+                    "blend",
+                    "weights",
+                    "scene",
+                    "size",
+                    "show",
+                    "environment",
+                ],
+            ),
         };
         match given.iter().find(|(name, is)| *is && !taken.contains(name)) {
             Some((name, _)) => Err(Problem::value(
@@ -199,18 +234,28 @@ impl EstimateOrder {
         }
     }
 
-    fn view(&self, profile: &Profile) -> View {
-        View {
-            show: Show::Paint,
+    /// What a picture of it shows, by the checks of a picture.
+    async fn view(&self, app: &App, profile: &Profile) -> Result<View, Problem> {
+        let show = self.show.unwrap_or_default();
+        let sampled = [
+            ("profile", self.profile.is_some()),
+            ("max_error", self.max_error.is_some()),
+            ("max_seconds", self.max_seconds.is_some()),
+        ];
+        view::refuse_samples_of_angles(show, &sampled, &Names::BODY)?;
+        let environment = view::environment(app, self.environment.as_deref(), &Names::BODY);
+        let asked = View {
+            show,
             scene: self.scene.unwrap_or_default(),
             size: self.size.unwrap_or([512; 2]),
-            samples_per_pixel: profile.samples_per_pixel,
-            environment: None,
+            samples_per_pixel: view::samples(show, None, profile),
+            environment: environment.await?,
             lights: None,
-        }
+        };
+        view::view(app, asked, &Names::BODY)
     }
 
-    async fn needed(&self, app: &App) -> Result<Needed, Problem> {
+    async fn needed(&self, app: &App, profile: &Profile) -> Result<Needed, Problem> {
         match self.work {
             WorkName::Ingest => {
                 let id = self.paint.as_deref();
@@ -246,22 +291,43 @@ impl EstimateOrder {
                 }
                 Ok(Needed::Blend(paints))
             }
-            WorkName::Realise | WorkName::Preview => match (&self.paint, &self.blend) {
-                (Some(id), None) => {
-                    if self.weights.is_some() {
-                        let problem = Problem::value("/weights", "One paint takes no weights.");
-                        return Err(problem.accepting("nothing"));
-                    }
-                    let paint = of_field(app.paint(id).await, "/paint")?;
-                    Ok(Needed::Thing(paint, None))
+            WorkName::Realise => {
+                let (of, weights) = self.thing(app).await?;
+                Ok(Needed::Realise(of, weights))
+            }
+            WorkName::Preview => {
+                let view = self.view(app, profile).await?;
+                let (of, weights) = self.thing(app).await?;
+                let unread = app.unread(view.environment.as_deref()).await;
+                Ok(Needed::Preview(Box::new(Picture {
+                    of,
+                    weights,
+                    view,
+                    unread: unread.map_err(Problem::in_body)?,
+                })))
+            }
+        }
+    }
+
+    async fn thing(
+        &self,
+        app: &App,
+    ) -> Result<(Arc<Shelved>, Option<RealisationWeights>), Problem> {
+        match (&self.paint, &self.blend) {
+            (Some(id), None) => {
+                if self.weights.is_some() {
+                    let problem = Problem::value("/weights", "One paint takes no weights.");
+                    return Err(problem.accepting("nothing"));
                 }
-                (None, Some(id)) => {
-                    let blend = of_field(app.blend(id).await, "/blend")?;
-                    let weights = self.weights_for(blend.names.len())?;
-                    Ok(Needed::Thing(blend, Some(weights)))
-                }
-                _ => Err(missing("paint").accepting("either paint or blend")),
-            },
+                let paint = of_field(app.paint(id).await, "/paint")?;
+                Ok((paint, None))
+            }
+            (None, Some(id)) => {
+                let blend = of_field(app.blend(id).await, "/blend")?;
+                let weights = self.weights_for(blend.names.len())?;
+                Ok((blend, Some(weights)))
+            }
+            _ => Err(missing("paint").accepting("either paint or blend")),
         }
     }
 
@@ -278,6 +344,7 @@ impl EstimateOrder {
     fn with_asked<T>(
         &self,
         needed: &Needed,
+        environment: Option<&Environment>,
         profile: &Profile,
         then: impl FnOnce(&Asked<'_>) -> T,
     ) -> T {
@@ -298,23 +365,18 @@ impl EstimateOrder {
                     shelved.iter().filter_map(|p| p.file_of_paint()).collect();
                 then(&Asked::Blend { paints: &paints })
             }
-            Needed::Thing(shelved, weights) => {
-                let (thing, weights) = (&shelved.thing, weights.as_ref());
-                if let WorkName::Realise = self.work {
-                    let format = self.format.unwrap_or(Format::Zip);
-                    return then(&Asked::Realise {
-                        thing,
-                        weights,
-                        format,
-                    });
-                }
-                then(&Asked::Preview {
-                    thing,
-                    weights,
-                    view: &self.view(profile),
-                    format: PictureFormat::Png,
-                })
-            }
+            Needed::Realise(shelved, weights) => then(&Asked::Realise {
+                thing: &shelved.thing,
+                weights: weights.as_ref(),
+                format: self.format.unwrap_or(Format::Zip),
+            }),
+            Needed::Preview(picture) => then(&Asked::Preview {
+                thing: &picture.of.thing,
+                weights: picture.weights.as_ref(),
+                view: &picture.view,
+                environment,
+                format: PictureFormat::Png,
+            }),
         }
     }
 }

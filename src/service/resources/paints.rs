@@ -12,10 +12,8 @@ use crate::service::app::App;
 use crate::service::http::{
     Address, Answer, Keep, Kind, NoQuery, PaintProblems, Problem, ProblemDocument, Problems, Query,
 };
-use crate::service::work::Format;
-
-/// Longest page of a list.
-const LONGEST_PAGE: u32 = 200;
+use crate::service::parameters::page;
+use crate::service::work::{Format, runner};
 
 /// Which paints to list.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -51,10 +49,7 @@ pub async fn list(
     State(app): State<App>,
     Query(query): Query<ListQuery>,
 ) -> Result<Answer, Problem> {
-    let limit = query.limit.unwrap_or(50);
-    if !(1..=LONGEST_PAGE).contains(&limit) {
-        return Err(Problem::parameter("limit", format!("limit is {limit}.")).accepting("1 to 200"));
-    }
+    let limit = page::limit(query.limit)?;
     let (q, cursor) = (query.q.as_deref(), query.cursor.as_deref());
     let visibility = query.visibility.unwrap_or_default().into();
     let list = if let Some(color) = Color::of_query(query.near.as_deref(), query.angle)? {
@@ -62,30 +57,14 @@ pub async fn list(
             .page(&app, q, visibility, cursor, limit as usize)
             .await?
     } else {
-        let cursor = cursor
-            .map(|cursor| i64::from_str_radix(cursor, 36))
-            .transpose();
-        let cursor = cursor.map_err(|_| {
-            Problem::parameter("cursor", "The cursor was not made here.")
-                .accepting("`next` of the page before")
-        })?;
-        let page = app.catalogue.paints(q, visibility, cursor, limit).await?;
+        let begin = page::begin(cursor)?;
+        let page = app.catalogue.paints(q, visibility, begin, limit).await?;
         PaintList {
             paints: page.paints.into_iter().map(PaintSummary::from).collect(),
-            next: page.next.map(base36),
+            next: page.next.map(page::cursor),
         }
     };
     Ok(Answer::json(&list, Keep::Revalidated))
-}
-
-/// A cursor says nothing to who holds it.
-fn base36(mut number: i64) -> String {
-    let mut digits = Vec::new();
-    while number > 0 {
-        digits.push(char::from_digit(u32::try_from(number % 36).unwrap_or(0), 36).unwrap_or('0'));
-        number /= 36;
-    }
-    digits.iter().rev().collect()
 }
 
 /// What is known about a paint.
@@ -177,6 +156,6 @@ pub async fn delete(
             "PATCH with {\"visibility\": \"private\"}, or a service started with --no-samples",
         ));
     }
-    app.forget_paint(&id).await?;
+    runner::to_its_end(async move { app.forget_paint(&id).await }).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -180,7 +180,7 @@ pub async fn create(
     let profile = asked.of_body()?;
     let spp = order.samples_per_pixel;
     let environment =
-        view::surroundings(&app, order.environment.as_deref(), &view::Names::BODY).await?;
+        view::environment(&app, order.environment.as_deref(), &view::Names::BODY).await?;
     let asked = View {
         show,
         scene: order.scene.unwrap_or_default(),

@@ -138,8 +138,9 @@ pub async fn upload(
         },
     );
     let order = query.and_then(|Query(query)| Ok((query.order()?, target?)));
-    let order =
-        order.and_then(|order| receiving::check_headers(&app, &parts.headers).map(|()| order));
+    let order = order.and_then(|order| {
+        receiving::check_headers(&app, &MEASUREMENT, &parts.headers).map(|()| order)
+    });
     let (order, idempotency) = match order.and_then(|order| Ok((order, idempotency?))) {
         Ok(asked) => asked,
         Err(problem) => {
@@ -169,67 +170,41 @@ struct Accepted {
 async fn accept(
     app: App,
     received: Box<dyn BlobWriter>,
-    (mut order, target): (IngestOrder, Target),
+    (order, target): (IngestOrder, Target),
     idempotency: Idempotency,
 ) -> Result<Accepted, Problem> {
-    // Until a job names the upload it must not be swept as nobody's.
-    let mut naming = app.removal.read().await;
-    let stored = received.finish().await?;
+    let uploaded = app.uploaded(received).await?;
+    let accepted = submitted(&app, uploaded.blob(), (order, target), &idempotency).await;
+    uploaded.settle(accepted).await
+}
+
+async fn submitted(
+    app: &App,
+    upload: Hash,
+    (mut order, target): (IngestOrder, Target),
+    idempotency: &Idempotency,
+) -> Result<Accepted, Problem> {
     let whole = (
-        stored.hash.to_string(),
+        upload.to_string(),
         &order,
         target.max_error,
         target.max_seconds,
     );
-    let claimed = idempotency.claim(&app, &ids::asked("paint", &whole)).await;
+    idempotency.claim(app, &ids::asked("paint", &whole)).await?;
     let mut picked = None;
-    let ready = match claimed {
-        Ok(()) if target.is_some() => {
-            // Not held while a place to compute is waited for.
-            drop(naming);
-            let found = pick_for_upload(&app, stored.hash, &order, target).await;
-            naming = app.removal.read().await;
-            match found {
-                Ok(_) if app.blobs.local(stored.hash).await?.is_none() => {
-                    Err(Problem::overloaded())
-                }
-                Ok(found) => {
-                    order.profile = *found.profile();
-                    picked = Some(found);
-                    Ok(())
-                }
-                Err(problem) => Err(problem),
-            }
-        }
-        claimed => claimed,
+    if target.is_some() {
+        let found = pick_for_upload(app, upload, &order, target).await?;
+        order.profile = *found.profile();
+        picked = Some(found);
+    }
+    let id = ids::made_of("p_", &(upload.to_string(), &order));
+    let job = if app.catalogue.paint(&id).await?.is_some() {
+        None
+    } else {
+        let request = IngestRequest::new(upload, order);
+        Some(runner::submit(app, JobKind::Ingest, &id, &request).await?)
     };
-    if let Err(problem) = ready {
-        drop(naming);
-        app.forget_upload(stored.hash).await?;
-        return Err(problem);
-    }
-    let id = ids::made_of("p_", &(stored.hash.to_string(), &order));
-    if app.catalogue.paint(&id).await?.is_some() {
-        return Ok(Accepted {
-            id,
-            job: None,
-            picked,
-        });
-    }
-    let request = IngestRequest::new(stored.hash, order);
-    let job = runner::submit(&app, JobKind::Ingest, &id, &request).await;
-    drop(naming);
-    match job {
-        Ok(job) => Ok(Accepted {
-            id,
-            job: Some(job),
-            picked,
-        }),
-        Err(problem) => {
-            app.forget_upload(stored.hash).await?;
-            Err(problem)
-        }
-    }
+    Ok(Accepted { id, job, picked })
 }
 
 async fn pick_for_upload(

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 use super::documents::PaintDocument;
 use crate::service::app::App;
 use crate::service::http::{Address, Answer, Json, NoQuery, PaintProblems, Problem};
+use crate::service::work::runner;
 use crate::store;
 
 /// Whether lists show a paint.
@@ -61,6 +62,8 @@ pub async fn change(
     _: NoQuery,
     Json(change): Json<PaintChange>,
 ) -> Result<Answer, Problem> {
-    app.show_paint(&id, change.visibility.into()).await?;
+    let (on, shown) = (app.clone(), id.clone());
+    let visibility = change.visibility.into();
+    runner::to_its_end(async move { on.show_paint(&shown, visibility).await }).await?;
     Ok(app.paint(&id).await?.told())
 }

@@ -6,9 +6,10 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use super::workbench::call_off;
-use super::works::{Picture, PictureFormat, View, WorkError};
+use super::works::{Picture, PictureFormat, Show, View, WorkError};
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
+use crate::service::environments::Unread;
 use crate::service::http::{Keep, Kind, Problem};
 use crate::service::ids;
 use crate::service::shelf::Shelved;
@@ -29,7 +30,7 @@ pub struct Drawn {
     pub time: Duration,
 }
 
-/// Key of a picture: everything that makes it.
+/// Key of a picture: everything that makes it. The paint is no part of angles.
 #[must_use]
 pub fn key(
     thing: &Shelved,
@@ -37,10 +38,13 @@ pub fn key(
     view: &View,
     format: PictureFormat,
 ) -> Hash {
-    ids::key(
-        "preview",
-        &(&thing.id, thing.file.to_string(), weights, view, format),
-    )
+    match view.show {
+        Show::Paint => ids::key(
+            "preview",
+            &(&thing.id, thing.file.to_string(), weights, view, format),
+        ),
+        Show::Aspecular => ids::key("aspecular", &(view, format)),
+    }
 }
 
 /// Draws a picture, or finds the one that was drawn before; who asks at the same time waits for the same.
@@ -64,13 +68,21 @@ pub async fn draw(
         let compute = move || async move {
             let (works, counter) = (Arc::clone(&on.works), on.metrics.previews_rendered.clone());
             let bench = on.bench.clone();
+            let app = on.clone();
             let progress = move |_: f32| {
-                if on.is_stopping() || !on.watchers.any(key) {
+                if app.is_stopping() || !app.watchers.any(key) {
                     call_off();
                 }
             };
+            let unread = on.unread(view.environment.as_deref()).await?;
             let drawn = bench.run_or_call_off(move || {
-                works.preview(&thing.thing, weights.as_ref(), &view, format, &progress)
+                // Who waited for a place may be gone by now.
+                progress(0.0);
+                let environment = unread.as_ref().map(Unread::read).transpose()?;
+                let (thing, weights, light) =
+                    (&thing.thing, weights.as_ref(), environment.as_deref());
+                let drawn = works.preview(thing, weights, &view, light, format, &progress);
+                drawn.map_err(WorkError::of_query)
             });
             let Ok(drawn) = drawn.await? else {
                 return Err(Problem::new(
@@ -78,7 +90,7 @@ pub async fn draw(
                     "Nobody waited for this picture any more.",
                 ));
             };
-            let picture = drawn.map_err(WorkError::of_query)?;
+            let picture = drawn?;
             counter.increment(1);
             Ok(kept_form(&picture))
         };

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::paint::PaintFile;
-use crate::service::surroundings::Surroundings;
+use crate::workshop::Environment;
 
 /// Share done, from 0 to 1. It does not return when the work was called off.
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
@@ -50,9 +50,9 @@ pub struct View {
     pub size: [u32; 2],
     /// Samples per pixel.
     pub samples_per_pixel: u32,
-    /// Panorama in place of the built-in studio.
+    /// Id of an environment in place of the built-in studio; its light stands beside the view where work is done.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub environment: Option<Surroundings>,
+    pub environment: Option<String>,
     /// Lights in place of the scene's usual one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lights: Option<Vec<Light>>,
@@ -90,6 +90,8 @@ pub enum Asked<'a> {
         weights: Option<&'a RealisationWeights>,
         /// What it shows; the profile says how many samples.
         view: &'a View,
+        /// The light of its environment, where that is not the built-in studio.
+        environment: Option<&'a Environment>,
         /// What it is written as.
         format: PictureFormat,
     },
@@ -175,7 +177,7 @@ pub trait Works: Debug + Send + Sync {
     /// [`WorkError`] for a thing that is no blend.
     fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError>;
 
-    /// A paint, or a blend at some weights, becomes a picture.
+    /// A paint, or a blend at some weights, becomes a picture, lit by the environment that the view names.
     ///
     /// # Errors
     ///
@@ -185,6 +187,7 @@ pub trait Works: Debug + Send + Sync {
         thing: &Thing,
         weights: Option<&RealisationWeights>,
         view: &View,
+        environment: Option<&Environment>,
         format: PictureFormat,
         progress: Progress<'_>,
     ) -> Result<Picture, WorkError>;

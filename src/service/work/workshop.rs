@@ -12,7 +12,7 @@ use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::measurement::ReadOptions;
 use crate::paint::{Limits, PaintFile};
-use crate::workshop::{self, IngestOptions, PreviewOptions, Work, WorkshopError};
+use crate::workshop::{self, Environment, IngestOptions, PreviewOptions, Work, WorkshopError};
 
 /// Does the work, within limits.
 #[derive(Clone, Copy, Debug)]
@@ -81,11 +81,12 @@ impl Workshop {
                 thing,
                 weights,
                 view,
+                environment,
                 format,
             } => then(&Work::Preview {
                 thing,
                 weights,
-                options: &options_of(view),
+                options: &options_of(view, environment),
                 format,
                 limits: &self.limits,
                 written: false,
@@ -102,13 +103,13 @@ fn paint_of(thing: &Thing) -> Result<&PaintFile, WorkError> {
     }
 }
 
-fn options_of(view: &View) -> PreviewOptions {
+fn options_of(view: &View, environment: Option<&Environment>) -> PreviewOptions {
     PreviewOptions {
         show: view.show,
         scene: view.scene,
         size: view.size,
         samples_per_pixel: view.samples_per_pixel,
-        environment: view.environment.as_ref().map(|of| of.environment.clone()),
+        environment: environment.cloned(),
         lights: view.lights.clone(),
     }
 }
@@ -152,10 +153,11 @@ impl Works for Workshop {
         thing: &Thing,
         weights: Option<&RealisationWeights>,
         view: &View,
+        environment: Option<&Environment>,
         format: PictureFormat,
         progress: Progress<'_>,
     ) -> Result<Picture, WorkError> {
-        let options = options_of(view);
+        let options = options_of(view, environment);
         let made = workshop::preview(thing, weights, &options, format, &self.limits, progress)?;
         let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
         let mut accuracy = Vec::new();

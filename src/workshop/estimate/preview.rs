@@ -1,6 +1,6 @@
 //! Estimates of a picture.
 
-use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, timed, write_seconds};
+use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, write_seconds};
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::Limits;
@@ -33,6 +33,15 @@ pub fn estimate_preview(
     profile: &Profile,
     written: bool,
 ) -> Result<Estimate, WorkshopError> {
+    // Angles have no samples to choose, whatever the profile says.
+    let options = &PreviewOptions {
+        samples_per_pixel: if options.show.is_paint() {
+            options.samples_per_pixel
+        } else {
+            1
+        },
+        ..options.clone()
+    };
     let [width, height] = options.size.map(f64::from);
     let mut samples: Vec<(f64, f64, (f64, f64))> = Vec::new();
     let batches = |spp: u32| f64::from(spp.div_ceil(ENOUGH));
@@ -67,7 +76,11 @@ pub fn estimate_preview(
     let least = LEAST_SHARE * last.1 / last.0 * work;
     let seconds = extrapolated((first.0, first.1), (last.0, last.1), work).max(least);
     let bytes = extrapolated(first.2, last.2, width * height);
-    let (_, error) = timed(|| sampling(thing, weights, options, limits));
+    let error = if options.show.is_paint() {
+        sampling(thing, weights, options, limits)?.mean_delta_e
+    } else {
+        0.0
+    };
     let mut stages = vec![Stage {
         stage: "draw",
         seconds,
@@ -79,7 +92,7 @@ pub fn estimate_preview(
         });
     }
     let error = EstimatedError {
-        value: Some(error?.mean_delta_e),
+        value: Some(error),
         unit: "CIEDE2000",
     };
     let drawn_with = Profile {
