@@ -104,7 +104,12 @@ async fn a_picture_is_lit_by_the_panorama_that_is_asked_for() {
     let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
     let headers = [("Prefer", "wait=300")];
     let uploaded = house
-        .ask("POST", "/v1/paints", &headers, &paint.to_bytes())
+        .ask(
+            "POST",
+            "/v1/paints",
+            &headers,
+            &paint.to_bytes().expect("finite"),
+        )
         .await;
     let paint = uploaded.json()["id"].as_str().expect("an id").to_owned();
     let red = upload(&house, &panorama([128, 16, 16, 129]), 201).await;

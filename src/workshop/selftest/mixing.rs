@@ -226,8 +226,8 @@ pub(super) fn far_weights(subject: &Subject<'_>) -> Vec<Check> {
 pub(super) fn machine(subject: &Subject<'_>) -> Vec<Check> {
     let bytes = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let blend = || blend(subject.paint, subject.partner).map(|b| b.to_bytes());
-        pool.ok().and_then(|pool| pool.install(blend))
+        let blend = || blend(subject.paint, subject.partner).map(|b| b.to_bytes().ok());
+        pool.ok().and_then(|pool| pool.install(blend)).flatten()
     };
     let first = bytes(1);
     let differing = [2, 8]
