@@ -8,7 +8,7 @@ use super::{
 use crate::color::{Lab, LinearRgb};
 use crate::paint::{
     AngleGrid, CarPaint, Clustering, Coat, ColorTable, Container, ContainerError, FlakeTexture,
-    Flakes, Limits, Lobe, PaintError, Reader, Writer,
+    Flakes, Limits, Lobe, NotFinite, PaintError, Reader, Writer, check_corners, check_list,
 };
 
 /// Latest version of the file that is read and the one that is written.
@@ -74,8 +74,11 @@ impl Blend {
     }
 
     /// The bytes of the file.
-    #[must_use]
-    pub fn to_bytes(&self) -> Vec<u8> {
+    ///
+    /// # Errors
+    ///
+    /// [`NotFinite`] for the first number that is none, wherever it stands.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, NotFinite> {
         let mut writer = Writer::default();
         for paint in &self.paints {
             let nodes: Vec<[f64; 3]> = paint
@@ -88,8 +91,11 @@ impl Blend {
         }
         if let Some(flakes) = &self.flakes {
             writer.array(&flakes.offsets);
+            check_list("flakes.probability", &flakes.probability)?;
             writer.array(&flakes.probability);
-            for own in &flakes.boxes {
+            for (place, own) in flakes.boxes.iter().enumerate() {
+                check_corners(&format!("paints[{place}].lower"), &own.lower)?;
+                check_corners(&format!("paints[{place}].upper"), &own.upper)?;
                 writer.array(&own.lower);
                 writer.array(&own.upper);
             }

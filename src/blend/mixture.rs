@@ -55,7 +55,8 @@ pub(super) fn clusters_at(
             let slice = flakes.slice(h, d);
             for ((&p, &lower), &upper) in slice.probability.iter().zip(slice.lower).zip(slice.upper)
             {
-                if p * weight > 0.0 {
+                // What is below 0 or no number is passed on: a solver names it.
+                if p * weight != 0.0 {
                     out.push(Cluster {
                         probability: p * weight,
                         lower,

@@ -413,7 +413,7 @@ fn a_file_gives_the_blend_back() {
         &paint(23, &[0.0, 40.0], D),
         &paint(24, H, D),
     ]);
-    let bytes = blend.to_bytes();
+    let bytes = blend.to_bytes().expect("finite");
     assert_eq!(
         Blend::from_bytes(&bytes, &Limits::default()).expect("reads"),
         blend

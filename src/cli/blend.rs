@@ -66,7 +66,7 @@ impl Blend {
             &|share| progress.at(share),
         )?;
         stages.end("blend");
-        output::replace(&self.out, &made.blend.to_bytes())?;
+        output::replace(&self.out, &made.blend.to_bytes()?)?;
         drop(progress);
         stages.end("write");
         stages.write(self.timings.as_deref())?;

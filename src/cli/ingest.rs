@@ -131,7 +131,7 @@ impl Ingest {
         let stages = RefCell::new(Stages::begin());
         let ended = |stage| stages.borrow_mut().end(stage);
         let paint = ingest_in_stages(&path, &options, &|share| progress.at(share), &ended)?;
-        output::replace(&self.out, &paint.to_bytes())?;
+        output::replace(&self.out, &paint.to_bytes()?)?;
         ended("write");
         drop(progress);
         stages.borrow().write(self.timings.as_deref())?;

@@ -51,7 +51,8 @@ impl Samples {
                 let progress = Progress::new("simulating flakes");
                 let bytes = sample
                     .build(&profile.profile()?, &|share| progress.at(share))?
-                    .to_bytes();
+                    .to_bytes()
+                    .map_err(WorkshopError::from)?;
                 output::replace(out, &bytes)?;
                 drop(progress);
                 if json {

@@ -11,6 +11,8 @@ use bytemuck::{Pod, Zeroable};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::finite::{self, NotFinite};
+
 const MAGIC: &[u8; 8] = b"carpaint";
 const CHECKSUM: usize = 32;
 
@@ -116,11 +118,20 @@ impl Writer {
 
     /// The whole file.
     ///
+    /// # Errors
+    ///
+    /// [`NotFinite`] when a number in the header is none.
+    ///
     /// # Panics
     ///
     /// When the header does not serialise, which a plain struct always does.
-    #[must_use]
-    pub fn finish(self, kind: &'static str, version: u32, header: &impl Serialize) -> Vec<u8> {
+    pub fn finish(
+        self,
+        kind: &'static str,
+        version: u32,
+        header: &impl Serialize,
+    ) -> Result<Vec<u8>, NotFinite> {
+        finite::check(header)?;
         let header = serde_json::to_vec(header).expect("plain data serialises");
         let mut file = Vec::with_capacity(self.body.len() + header.len() + 128);
         file.extend_from_slice(MAGIC);
@@ -132,7 +143,7 @@ impl Writer {
         file.extend_from_slice(&self.body);
         let checksum = blake3::hash(&file);
         file.extend_from_slice(checksum.as_bytes());
-        file
+        Ok(file)
     }
 }
 
@@ -254,7 +265,8 @@ mod tests {
         let mut writer = Writer::default();
         writer.array(&[1.5_f64, -2.0]);
         writer.array(&[[1_u32, 2]]);
-        writer.finish("paint", 3, &serde_json::json!({"name": "silver"}))
+        let header = serde_json::json!({"name": "silver"});
+        writer.finish("paint", 3, &header).expect("finite")
     }
 
     #[test]

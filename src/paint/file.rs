@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::container::{Arrays, Container, ContainerError, Writer};
 use super::energy::EnergyCertificate;
+use super::finite::{NotFinite, check_corners, check_list};
 use super::{
     AngleGrid, CarPaint, ClusteringError, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes,
     Limits, Lobe, PaintError, Percentiles, ReadingResiduals, Realisation,
@@ -243,8 +244,17 @@ impl PaintFile {
     }
 
     /// The bytes of the file.
-    #[must_use]
-    pub fn to_bytes(&self) -> Vec<u8> {
+    ///
+    /// # Errors
+    ///
+    /// [`NotFinite`] for the first number that is none, wherever it stands.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, NotFinite> {
+        // Colors of a table are finite, or there is no table.
+        if let Some(flakes) = &self.paint.flakes {
+            check_list("flakes.probability", &flakes.probability)?;
+            check_corners("flakes.lower", &flakes.lower)?;
+            check_corners("flakes.upper", &flakes.upper)?;
+        }
         let mut writer = Writer::default();
         write_arrays(&self.paint, &mut writer);
         let header = Header {

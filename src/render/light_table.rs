@@ -245,9 +245,8 @@ mod tests {
         }
     }
 
-    /// A quarter of the sky bright, the rest dim: the drawn light must give the irradiance of plain summation.
-    #[test]
-    fn drawn_light_is_the_light_there_is() {
+    /// A quarter of the sky bright, the rest dim.
+    fn quarter() -> Environment {
         let (width, height) = (64, 32);
         let pixels = (0..width * height).map(|k| {
             [if k % width < 16 && k / width < 12 {
@@ -257,7 +256,13 @@ mod tests {
             }; 3]
         });
         let map = Map::new(width, height, pixels.collect());
-        let environment = Environment::map(map, Held::NONE);
+        Environment::map(map, Held::NONE)
+    }
+
+    /// The drawn light must give the irradiance of plain summation.
+    #[test]
+    fn drawn_light_is_the_light_there_is() {
+        let environment = quarter();
         let table = LightTable::new(&environment).expect("light");
         for normal in [
             [0.0, 1.0, 0.0],
@@ -293,13 +298,97 @@ mod tests {
 
     #[test]
     fn densities_of_drawn_directions_are_the_stated_ones() {
-        let environment = Environment::studio();
-        let table = LightTable::new(&environment).expect("light");
-        let facing = LightTable::facing(unit([0.1, 0.7, 0.6]));
-        for sample in table.seen_from(facing).samples.iter().step_by(37) {
-            let stated = table.density(facing, sample.direction);
-            // A direction on the edge of a cell may be counted to its neighbour.
-            assert!((stated / sample.density - 1.0).abs() < 1e-4 || stated > 0.0);
+        for environment in [Environment::studio(), quarter()] {
+            let table = LightTable::new(&environment).expect("light");
+            for facing in [0, 40, LightTable::facing(unit([0.1, 0.7, 0.6])), 215] {
+                let samples = &table.seen_from(facing).samples;
+                let stated = samples.iter().filter(|sample| {
+                    let stated = table.density(facing, sample.direction);
+                    (stated / sample.density - 1.0).abs() < 1e-6
+                });
+                // A direction in single precision on the edge of a part may be counted to its neighbour.
+                let share = stated.count() as f64 / samples.len() as f64;
+                assert!(share >= 0.95, "facing {facing}: {share}");
+            }
+        }
+    }
+
+    /// Blocks of the sphere that draws are counted in, across and down.
+    const BLOCKS: [usize; 2] = [16, 16];
+
+    fn block(d: Vec3) -> usize {
+        let u = (f64::from(d[0]).atan2(-f64::from(d[2])) / std::f64::consts::TAU).rem_euclid(1.0);
+        let v = f64::from(d[1]).clamp(-1.0, 1.0).acos() / std::f64::consts::PI;
+        let place = |share: f64, of: usize| ((share * of as f64) as usize).min(of - 1);
+        place(v, BLOCKS[1]) * BLOCKS[0] + place(u, BLOCKS[0])
+    }
+
+    /// Integral of the stated density over each block: the middle of every part by the solid angle of its part.
+    fn expected(table: &LightTable<'_>, facing: usize) -> Vec<f64> {
+        let (across, down) = (WIDTH * 3, HEIGHT * 3);
+        let mut sums = vec![0.0; BLOCKS[0] * BLOCKS[1]];
+        let edge = |row: usize| (std::f64::consts::PI * row as f64 / down as f64).cos();
+        for row in 0..down {
+            let solid = (edge(row) - edge(row + 1)) * std::f64::consts::TAU / across as f64;
+            for column in 0..across {
+                let (u, v) = (
+                    (column as f32 + 0.5) / across as f32,
+                    (row as f32 + 0.5) / down as f32,
+                );
+                let d = Map::direction(u, v);
+                sums[block(d)] += f64::from(table.density(facing, d)) * solid;
+            }
+        }
+        sums
+    }
+
+    /// χ² of how often directions are drawn in each block against the integral of the density, over many facings.
+    #[test]
+    fn directions_are_drawn_as_often_as_their_density_says() {
+        for (what, environment) in [("studio", Environment::studio()), ("quarter", quarter())] {
+            let table = LightTable::new(&environment).expect("light");
+            let mut counts = vec![0.0_f64; BLOCKS[0] * BLOCKS[1]];
+            let mut wanted = vec![0.0_f64; BLOCKS[0] * BLOCKS[1]];
+            let (mut most, mut facings) = (0.0_f64, 0.0_f64);
+            for facing in (0..6 * EDGE * EDGE).step_by(7) {
+                facings += 1.0;
+                let own = expected(&table, facing);
+                most = most.max((own.iter().sum::<f64>() - 1.0).abs());
+                let draws = f32::from(STRATA) * f32::from(STRATA);
+                for (sum, own) in wanted.iter_mut().zip(own) {
+                    *sum += own * f64::from(draws);
+                }
+                for k in 0..STRATA * STRATA {
+                    let place = |k: u16| (f32::from(k) + 0.5) / f32::from(STRATA);
+                    let drawn = table.sample(facing, [place(k % STRATA), place(k / STRATA)]);
+                    counts[block(drawn.direction)] += 1.0;
+                }
+            }
+            let (mut statistic, mut freedom) = (0.0_f64, 0.0_f64);
+            let (mut rare, mut rarely) = (0.0_f64, 0.0_f64);
+            for (count, wanted) in counts.iter().zip(wanted) {
+                if wanted >= 5.0 {
+                    statistic += (count - wanted).powi(2) / wanted;
+                    freedom += 1.0;
+                } else {
+                    rare += wanted;
+                    rarely += count;
+                }
+            }
+            // Parts of a cell count as of one size, which at the poles they are not.
+            assert!(most < 1e-3, "{what}: a density sums to 1 but for {most:e}");
+            // Draws are stratified, which scatters less than chance. Six standard deviations of chance.
+            assert!(
+                freedom > 60.0 && statistic <= freedom + 6.0 * (2.0 * freedom).sqrt(),
+                "{what}: χ² {statistic} of {freedom}"
+            );
+            // All facings draw with the same points of the unit square, and the one in its corner lies at the end of every
+            // distribution, where hardly anything is expected.
+            let accepted = 6.0 * rare.sqrt().max(1.0) + facings;
+            assert!(
+                (rarely - rare).abs() <= accepted,
+                "{what}: {rarely} of {rare}"
+            );
         }
     }
 }

@@ -7,7 +7,7 @@ use super::environments::unknown_environment;
 use super::http::Problem;
 use super::shelf::unknown_paint;
 use super::work::{Thing, colors};
-use crate::paint::PaintFile;
+use crate::paint::{NotFinite, PaintFile};
 use crate::store::{BlobBytes, EnvironmentRecord, Hash, PaintRecord, Visibility};
 
 impl App {
@@ -49,14 +49,15 @@ impl App {
         let worked_out = tokio::task::spawn_blocking(move || {
             let content = Hash::from(file.paint.content_hash());
             let (bytes, name, source) = (
-                file.to_bytes(),
+                file.to_bytes()?,
                 file.name.clone(),
                 file.provenance.source.clone(),
             );
             let colors = colors::read(&*works, &Thing::Paint(Box::new(file)));
-            (bytes, content, name, source, colors)
+            Ok::<_, NotFinite>((bytes, content, name, source, colors))
         });
-        let (bytes, content, name, source, colors) = worked_out.await.map_err(Problem::internal)?;
+        let worked_out = worked_out.await.map_err(Problem::internal)?;
+        let (bytes, content, name, source, colors) = worked_out.map_err(Problem::internal)?;
         let paint = self.blobs.put(bytes.into()).await?.hash;
         let record = PaintRecord {
             id: id.to_owned(),

@@ -91,6 +91,12 @@ impl From<crate::blend::WeightError> for WorkshopError {
     }
 }
 
+impl From<crate::paint::NotFinite> for WorkshopError {
+    fn from(error: crate::paint::NotFinite) -> Self {
+        Self::internal(error)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

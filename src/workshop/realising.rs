@@ -185,7 +185,7 @@ pub fn realise(
 ) -> Result<Made, WorkshopError> {
     if let (Format::Paint, Thing::Paint(file)) = (format, thing) {
         return Ok(Made {
-            bytes: file.to_bytes(),
+            bytes: file.to_bytes()?,
             report: json!({ "paint": file.name }),
             notes: Vec::new(),
         });
@@ -208,7 +208,7 @@ pub fn realise(
         Format::Json => export::material_json(&chosen.paint, &about, &profile.export),
         Format::Paint => {
             return Ok(Made {
-                bytes: paint_file(&chosen, &error).to_bytes(),
+                bytes: paint_file(&chosen, &error).to_bytes()?,
                 report: chosen.report,
                 notes: chosen.notes,
             });

@@ -90,7 +90,7 @@ fn from_disk(inputs: &[&String]) -> Outcome<()> {
     for _ in 0..7 {
         let begin = Instant::now();
         let paints = ingest_all(inputs)?;
-        std::fs::write(out.path(), blended(&paints)?.to_bytes())?;
+        std::fs::write(out.path(), blended(&paints)?.to_bytes()?)?;
         seconds.push(begin.elapsed().as_secs_f64());
     }
     let mut limit = Vec::new();

@@ -78,6 +78,7 @@ fn sample(name: &str) -> Vec<u8> {
         .build(&Profile::draft(), &|_| ())
         .expect("builds")
         .to_bytes()
+        .expect("finite")
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -19,7 +19,12 @@ async fn a_picture_is_lit_by_the_panorama_that_is_asked_for() {
     let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
     let headers = [("Prefer", "wait=300")];
     let uploaded = house
-        .ask("POST", "/v1/paints", &headers, &paint.to_bytes())
+        .ask(
+            "POST",
+            "/v1/paints",
+            &headers,
+            &paint.to_bytes().expect("finite"),
+        )
         .await;
     let paint = uploaded.json()["id"].as_str().expect("an id").to_owned();
     let red = upload(&house, &panorama([128, 16, 16, 129]), 201).await;
@@ -161,7 +166,7 @@ async fn light_that_is_not_drawn_as_it_was_is_told_wherever_it_matters() {
     let paint = sample_by_name("white").expect("a sample");
     let paint = paint.build(&Profile::draft(), &|_| ()).expect("builds");
     let headers = [("Prefer", "wait=300")];
-    let bytes = paint.to_bytes();
+    let bytes = paint.to_bytes().expect("finite");
     let uploaded = house.ask("POST", "/v1/paints", &headers, &bytes);
     let paint = uploaded.await.json()["id"]
         .as_str()

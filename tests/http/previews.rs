@@ -88,7 +88,12 @@ async fn angles_are_the_same_for_every_paint_and_other_than_the_paint() {
         let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
         let headers = [("Prefer", "wait=300")];
         let uploaded = house
-            .ask("POST", "/v1/paints", &headers, &paint.to_bytes())
+            .ask(
+                "POST",
+                "/v1/paints",
+                &headers,
+                &paint.to_bytes().expect("finite"),
+            )
             .await;
         assert_eq!(uploaded.status, 201, "{}", uploaded.text());
         paints.push(uploaded.json()["id"].as_str().expect("an id").to_owned());

@@ -35,7 +35,8 @@ fn metallic(name: &str, angle_step: usize) -> Vec<u8> {
         ..draft
     };
     let sample = sample_by_name(name).expect("a sample");
-    sample.build(&profile, &|_| ()).expect("builds").to_bytes()
+    let paint = sample.build(&profile, &|_| ()).expect("builds");
+    paint.to_bytes().expect("finite")
 }
 
 async fn upload(house: &House, bytes: &[u8]) -> Value {

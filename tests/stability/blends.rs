@@ -1,8 +1,11 @@
 //! Blends at their ends, in other orders, and of paints that hardly blend.
 
-use crate::paints::{D, H, Stream, blend, flakes, metallic, pairs, realise, solid};
+use crate::paints::{D, H, Stream, blend, flakes, grid, metallic, pairs, realise, solid};
 use carpaint::blend::{Blend, BlendError, BlendSettings, Ingredient, RealisationWeights};
-use carpaint::paint::{CarPaint, Chi, Coat, Flakes, Limits, Lobe, Reflectance};
+use carpaint::color::Lab;
+use carpaint::paint::{
+    AngleGrid, CarPaint, Chi, Coat, ColorTable, Flakes, Limits, Lobe, Reflectance,
+};
 use std::collections::BTreeMap;
 
 /// Probability by box of one slice: what is left when clusters that carry the same box are merged again.
@@ -18,29 +21,43 @@ fn regrouped(flakes: &Flakes, slice: usize) -> BTreeMap<[u32; 6], f64> {
     groups
 }
 
+/// Lobes that add something, by ascending roughness.
+fn present(lobes: &[Lobe]) -> Vec<Lobe> {
+    let mut list: Vec<Lobe> = lobes.iter().copied().filter(|l| !l.is_absent()).collect();
+    list.sort_by(|x, y| x.alpha.total_cmp(&y.alpha));
+    list
+}
+
+/// Where each of a grid's angles stands on another that holds them all.
+fn places(of: &AngleGrid, on: &AngleGrid) -> Vec<usize> {
+    let place = |x: &f64| on.degrees().iter().position(|y| y == x);
+    of.degrees()
+        .iter()
+        .map(|x| place(x).expect("on the grid"))
+        .collect()
+}
+
+/// Nodes of a color table at the angles of another's grid, θd fastest, and the one color for all.
+fn colors_at(table: &ColorTable, of: &ColorTable) -> Vec<[f64; 3]> {
+    let columns = places(of.theta_d(), table.theta_d());
+    let rows = places(of.theta_h(), table.theta_h());
+    let nodes = rows.iter().flat_map(|row| {
+        let node = |column: &usize| table.nodes()[row * table.theta_d().len() + column];
+        columns.iter().map(node).collect::<Vec<_>>()
+    });
+    nodes.chain([table.overall()]).map(Lab::to_array).collect()
+}
+
 /// The original's own numbers, bit for bit, and its slices: boxes bit for bit, probabilities within 1e-12.
 fn assert_is(paint: &CarPaint, original: &CarPaint, what: &str) {
-    let present = |lobes: &[Lobe]| -> Vec<Lobe> {
-        let mut list: Vec<Lobe> = lobes.iter().copied().filter(|l| !l.is_absent()).collect();
-        list.sort_by(|x, y| x.alpha.total_cmp(&y.alpha));
-        list
-    };
-    assert_eq!(paint.coat, original.coat, "{what}");
-    assert_eq!(paint.diffuse, original.diffuse, "{what}");
-    assert_eq!(present(&paint.lobes), present(&original.lobes), "{what}");
+    assert_has_the_base_of(paint, original, what);
     let (Some(got), Some(want)) = (&paint.flakes, &original.flakes) else {
         assert_eq!(paint.flakes.is_some(), original.flakes.is_some(), "{what}");
         return;
     };
     assert_eq!(got.texture, want.texture, "{what}");
-    for (h, theta_h) in want.theta_h.degrees().iter().enumerate() {
-        for (d, theta_d) in want.theta_d.degrees().iter().enumerate() {
-            let place =
-                |grid: &[f64], x: &f64| grid.iter().position(|y| y == x).expect("on the grid");
-            let (row, column) = (
-                place(got.theta_h.degrees(), theta_h),
-                place(got.theta_d.degrees(), theta_d),
-            );
+    for (h, row) in places(&want.theta_h, &got.theta_h).into_iter().enumerate() {
+        for (d, column) in places(&want.theta_d, &got.theta_d).into_iter().enumerate() {
             let got = regrouped(got, row * got.theta_d.len() + column);
             let want = regrouped(want, h * want.theta_d.len() + d);
             assert!(
@@ -53,6 +70,26 @@ fn assert_is(paint: &CarPaint, original: &CarPaint, what: &str) {
             }
         }
     }
+}
+
+/// Everything but the flakes, bit for bit: on a finer grid the color table's own nodes.
+fn assert_has_the_base_of(paint: &CarPaint, original: &CarPaint, what: &str) {
+    assert_eq!(paint.coat, original.coat, "{what}");
+    assert_eq!(paint.diffuse, original.diffuse, "{what}");
+    assert_eq!(present(&paint.lobes), present(&original.lobes), "{what}");
+    let (got, want) = (&paint.color_table, &original.color_table);
+    let bits = |colors: Vec<[f64; 3]>| -> Vec<[u64; 3]> {
+        // A color at −0 is the color at 0.
+        colors
+            .iter()
+            .map(|lab| lab.map(|v| (v + 0.0).to_bits()))
+            .collect()
+    };
+    assert_eq!(
+        bits(colors_at(got, want)),
+        bits(colors_at(want, want)),
+        "{what}: colors differ"
+    );
 }
 
 fn unit_weights(n: usize, k: usize) -> Vec<f64> {
@@ -347,19 +384,110 @@ fn a_paint_given_twice_counts_with_both_weights() {
     }
 }
 
+/// The same paint to a millionth: of every parameter, of every color, and of every box and its probability.
+fn assert_is_nearly(paint: &CarPaint, original: &CarPaint, what: &str) {
+    // 1e-9 of another paint's numbers, none of which is more than a thousand times as large.
+    let close = |x: f64, y: f64, field: &str| {
+        assert!(
+            (x - y).abs() <= 1e-6 * y.abs().max(1e-3),
+            "{what}, {field}: {x} instead of {y}"
+        );
+    };
+    let ior = |p: &CarPaint| p.coat.map_or(1.0, |c| c.ior);
+    close(ior(paint), ior(original), "index");
+    if let (Some(x), Some(y)) = (paint.coat, original.coat) {
+        close(x.roughness, y.roughness, "coat's roughness");
+    }
+    for k in 0..3 {
+        close(paint.diffuse[k], original.diffuse[k], "diffuse");
+    }
+    let (x, y) = (present(&paint.lobes), present(&original.lobes));
+    assert_eq!(x.len(), y.len(), "{what}");
+    for (x, y) in x.iter().zip(&y) {
+        close(x.alpha, y.alpha, "α");
+        close(x.f0, y.f0, "F0");
+        for k in 0..3 {
+            close(x.weight[k], y.weight[k], "lobe's weight");
+        }
+    }
+    let (got, want) = (&paint.color_table, &original.color_table);
+    for (x, y) in colors_at(got, want).iter().zip(colors_at(want, want)) {
+        for k in 0..3 {
+            // Of Lab, which is up to 100, a millionth: an axis of a gray is 0.
+            assert!(
+                (x[k] - y[k]).abs() <= 1e-6,
+                "{what}: {x:?} instead of {y:?}"
+            );
+        }
+    }
+    let Some(got) = &paint.flakes else {
+        assert!(original.flakes.is_none(), "{what}");
+        return;
+    };
+    let Some(want) = &original.flakes else {
+        // A solid color's clusters are black.
+        let corners = got.lower.iter().chain(&got.upper).flatten();
+        assert!(
+            corners.copied().all(|v| v.abs() <= 1e-6),
+            "{what}: not black"
+        );
+        return;
+    };
+    for (h, row) in places(&want.theta_h, &got.theta_h).into_iter().enumerate() {
+        for (d, column) in places(&want.theta_d, &got.theta_d).into_iter().enumerate() {
+            let own = want.slice_at(h * want.theta_d.len() + d);
+            let got = got.slice_at(row * got.theta_d.len() + column);
+            let mut shares = vec![0.0; own.probability.len()];
+            for (k, p) in got.probability.iter().enumerate() {
+                // Each cluster lies on a box of the original, to a millionth of a Lab unit or of the corner.
+                let near = |(x, y): (&f32, &f32)| {
+                    f64::from(x - y).abs() <= 1e-6 * f64::from(y.abs()).max(1.0)
+                };
+                let on = |j: &usize| {
+                    got.lower[k].iter().zip(&own.lower[*j]).all(near)
+                        && got.upper[k].iter().zip(&own.upper[*j]).all(near)
+                };
+                let place = (0..shares.len()).find(on);
+                shares[place.unwrap_or_else(|| panic!("{what}: a box of no original"))] += p;
+            }
+            for (x, y) in shares.iter().zip(own.probability) {
+                // Probabilities do not follow the weights at all.
+                assert!((x - y).abs() <= 1e-12, "{what}: {x} instead of {y}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_billionth_beside_weight_one_is_the_same_paint_to_a_millionth() {
     let a = metallic(21, H, D);
-    let others = [
-        metallic(22, &[0.0, 20.0], D),
-        metallic(23, H, &[0.0, 7.0, 25.0]),
-        solid(24),
-        solid(27),
+    let b = metallic(22, &[0.0, 20.0], D);
+    let c = metallic(23, H, &[0.0, 7.0, 25.0]);
+    let (d, e) = (solid(24), solid(27));
+    let f = CarPaint {
+        color_table: table(&[0.0, 33.0], &[0.0, 10.0, 40.0], 25),
+        ..metallic(26, H, D)
+    };
+    let mixtures: [&[&CarPaint]; 8] = [
+        &[&a, &b],
+        &[&a, &c],
+        &[&a, &d],
+        &[&a, &e],
+        &[&a, &f],
+        &[&a, &b, &c],
+        &[&a, &d, &f, &b],
+        &[&a, &b, &c, &d, &f],
     ];
-    for other in &others {
-        let blend = blend(&[&a, other]);
-        for (near, exact) in [([1.0 - 1e-9, 1e-9], &a), ([1e-9, 1.0 - 1e-9], other)] {
-            let paint = realise(&blend, &near).paint;
+    for paints in mixtures {
+        let blend = blend(paints);
+        for (k, exact) in paints.iter().enumerate() {
+            let others = (paints.len() - 1) as f64;
+            let weights: Vec<f64> = (0..paints.len())
+                .map(|m| if m == k { 1.0 - 1e-9 } else { 1e-9 / others })
+                .collect();
+            let what = format!("paint {k} of {}", paints.len());
+            let paint = realise(&blend, &weights).paint;
+            assert_is_nearly(&paint, exact, &what);
             let (near, exact) = (Reflectance::new(&paint), Reflectance::new(exact));
             for (wi, wo) in pairs(200) {
                 let y = exact.evaluate(wi, wo, Chi::Table);
@@ -368,7 +496,7 @@ fn a_billionth_beside_weight_one_is_the_same_paint_to_a_millionth() {
                     // that at the most before it is 0. Below 1e-3 1/sr nobody sees a part in 1e6.
                     assert!(
                         (x - y).abs() <= 1e-6 * (y.abs() + 1e-3),
-                        "{x} instead of {y}"
+                        "{what}: {x} instead of {y}"
                     );
                 }
             }
@@ -517,6 +645,12 @@ fn flakes_fade_out_towards_a_solid_color_and_never_jump() {
         &metallic,
         "the metallic",
     );
+    // The other end keeps the clusters, all of them black, over the solid color's own base.
+    let end = realise(&blend, &[0.0, 1.0]).paint;
+    assert_has_the_base_of(&end, &solid, "the solid color");
+    let black = end.flakes.expect("black ones");
+    let corners = black.lower.iter().chain(&black.upper).flatten();
+    assert!(corners.clone().count() > 0 && corners.clone().all(|v| *v == 0.0));
 }
 
 #[test]
@@ -551,6 +685,58 @@ fn differing_grids_blend_on_their_union_and_keep_every_own_slice() {
         }
     }
     assert_eq!(blend.report().mixed.len(), 2);
+}
+
+/// A color table on these angles, none of its colors like another.
+fn table(theta_h: &[f64], theta_d: &[f64], seed: u64) -> ColorTable {
+    let mut random = Stream(seed);
+    let mut color = || Lab {
+        l: random.within(20.0, 90.0),
+        a: random.within(-20.0, 20.0),
+        b: random.within(-20.0, 20.0),
+    };
+    let nodes = (0..theta_h.len() * theta_d.len())
+        .map(|_| color())
+        .collect();
+    let overall = color();
+    ColorTable::new(grid(theta_h), grid(theta_d), nodes, overall).expect("one color a node")
+}
+
+#[test]
+fn differing_grids_of_color_tables_blend_on_their_union_and_keep_every_own_color() {
+    let dressed = |seed, color_table| CarPaint {
+        color_table,
+        ..metallic(seed, H, D)
+    };
+    let paints = [
+        dressed(63, table(&[0.0, 12.0, 50.0], &[0.0, 40.0], 66)),
+        dressed(64, table(&[3.0, 12.0, 80.0], &[20.0], 67)),
+        dressed(65, table(&[0.0], &[0.0, 40.0, 60.0], 68)),
+    ];
+    let blend = blend(&paints.iter().collect::<Vec<_>>());
+    for (k, own) in paints.iter().enumerate() {
+        let back = realise(&blend, &unit_weights(3, k)).paint;
+        let angles = (back.color_table.theta_h(), back.color_table.theta_d());
+        assert_eq!(angles.0.degrees(), [0.0, 3.0, 12.0, 50.0, 80.0]);
+        assert_eq!(angles.1.degrees(), [0.0, 20.0, 40.0, 60.0]);
+        assert_is(&back, own, &format!("paint {k}"));
+        // In between a node of the union has the interpolated color: the functions are one everywhere.
+        let (back, own) = (Reflectance::new(&back), Reflectance::new(own));
+        for (wi, wo) in pairs(300) {
+            let (x, y) = (
+                back.terms(wi, wo, Chi::Table).expect("above"),
+                own.terms(wi, wo, Chi::Table).expect("above"),
+            );
+            for c in 0..3 {
+                // A node goes to Lab and back, some twenty roundings of colors of 1; the base multiplies them.
+                let accepted = 1e-14 * y.base.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+                assert!(
+                    (x.base[c] - y.base[c]).abs() <= 10.0 * accepted,
+                    "{x:?} {y:?}"
+                );
+            }
+        }
+    }
 }
 
 #[test]

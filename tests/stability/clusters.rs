@@ -308,9 +308,24 @@ fn a_pixel_brighter_than_any_color_is_held_at_the_bound_and_counted() {
         let found = cluster_into(&pixels, 50).expect("finite pixels");
         assert_eq!((found.beyond, found.dead), (1, 0));
         assert!(found.upper.iter().flatten().all(|v| *v <= 2000.0));
-        // L = 2000 is a light of 17.4³ = 5260, of which one in 4096 is 1.3/π.
-        let mean = mean_of(&found);
-        assert!(mean.iter().all(|v| v.is_finite() && *v < 1.0), "{mean:?}");
+        // The one pixel is a cluster of its own, held at the bound.
+        let place = found.upper.iter().position(|upper| upper[0] == 2000.0);
+        let place = place.expect("a cluster at the bound");
+        assert_eq!(found.probability[place], 1.0 / 4096.0);
+        assert_eq!(
+            found.lower[place], found.upper[place],
+            "one texel, one color"
+        );
+        // Lab of bright texels is good to 2e-6 of f, 17.4 at the bound: 500 times that in a.
+        let [_, a, b] = found.upper[place];
+        assert!(a.abs() < 0.02 && b.abs() < 0.02, "{a} {b}");
+        // L = 2000 is a light of 17.4³ = 5250, of which one in 4096 is 1.28/π.
+        let bound = (2016.0_f64 / 116.0).powi(3) / PI;
+        let want = (4095.0 * f64::from(0.1_f32) + bound) / 4096.0;
+        // Light moves by 3 f²/500 · 1.09 · 3.24 of a, over 4096 π: 5e-4 of 0.02.
+        for mean in mean_of(&found) {
+            assert!((mean - want).abs() <= 1e-5, "{mean} instead of {want}");
+        }
     }
 }
 

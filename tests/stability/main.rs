@@ -12,6 +12,7 @@ mod bounds;
 mod clusters;
 mod color;
 mod export;
+mod files;
 mod fit;
 mod machine;
 mod paints;

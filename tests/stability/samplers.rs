@@ -3,9 +3,11 @@
 //! A statistic of `k` degrees of freedom is judged at six standard deviations of its normal approximation,
 //! `k + 6 √(2k)` (a chance of about 1e-7 for 40 or more): the streams are fixed, so a test that passes once always does.
 
-use crate::paints::{Stream, flakes, metallic};
+use crate::paints::{Stream, flakes, metallic, solid};
+use carpaint::color::Lab;
 use carpaint::export::{alias_table, inverse_cdf};
-use carpaint::paint::{FlakeSampler, RandomTexture, TexelDraw, cumulative};
+use carpaint::paint::{CarPaint, FlakeSampler, Flakes, Limits, RandomTexture, TexelDraw};
+use std::f64::consts::PI;
 
 /// Pearson's statistic over cells that expect at least five draws, and its degrees of freedom.
 fn chi_square(counts: &[u64], probability: &[f64]) -> (f64, f64) {
@@ -99,27 +101,65 @@ fn the_inverse_cdf_of_500_steps_says_itself_how_far_it_is_from_the_distribution(
     assert!(counts.iter().filter(|c| **c == 0).count() > 20);
 }
 
+/// Four slices of point boxes, each gray of a lightness of its own, with other probabilities in each: the most probable
+/// first, last, in the middle, and all alike and many more than the parts of the unit interval that draws are guided by.
+fn points() -> (Flakes, Vec<Vec<f64>>) {
+    let falling = skewed(40);
+    let rising: Vec<f64> = falling.iter().rev().copied().collect();
+    let peaked: Vec<f64> = rising[20..].iter().chain(&falling[20..]).copied().collect();
+    let sum: f64 = peaked.iter().sum();
+    let peaked = peaked.iter().map(|p| p / sum).collect();
+    let slices = vec![falling, rising, peaked, vec![1.0 / 160.0; 160]];
+    let mut made = flakes(&[0.0, 40.0], &[0.0, 40.0], &[]);
+    let mut offsets = vec![0];
+    for slice in &slices {
+        for (k, p) in slice.iter().enumerate() {
+            let point = [2.0 + 0.5 * k as f32, 0.0, 0.0];
+            made.probability.push(*p);
+            made.lower.push(point);
+            made.upper.push(point);
+        }
+        offsets.push(made.probability.len() as u32);
+    }
+    made.offsets = offsets.into();
+    (made, slices)
+}
+
 #[test]
 fn texels_pick_clusters_as_often_as_they_are_probable_at_every_angle() {
-    let boxes: Vec<_> = skewed(40)
-        .into_iter()
-        .zip(0_u8..)
-        .map(|(p, k)| (p, [f32::from(k), 0.0, 0.0], [f32::from(k), 0.0, 0.0]))
-        .collect();
-    let metallic = flakes(&[0.0, 40.0], &[0.0, 40.0], &boxes);
-    let cumulative = &cumulative(&metallic)[..40];
-    let persistence = [8.0, 40.0];
+    let (made, slices) = points();
+    let paint = CarPaint {
+        flakes: Some(made.clone()),
+        ..solid(16)
+    };
+    paint.validate(&Limits::default()).expect("a paint");
+    let sampler = FlakeSampler::new(&made);
     let mut random = Stream(12);
     let cells: Vec<u32> = (0..400_000).map(|_| random.bits() as u32).collect();
-    for (h, d) in [(0.0, 0.0), (13.7, 2.0), (40.0, 40.0), (77.0, 80.0)] {
-        let mut counts = vec![0_u64; 40];
+    // On the grid's angles, and beyond its border, where the border's slice holds.
+    for (h, d, k) in [
+        (0.0, 0.0, 0),
+        (0.0, 40.0, 1),
+        (40.0, 0.0, 2),
+        (40.0, 40.0, 3),
+        (77.0, 80.0, 3),
+        (77.0, 0.0, 2),
+    ] {
+        let mut counts = vec![0_u64; slices[k].len()];
         for &cell in &cells {
-            let draw = TexelDraw::of(cell, h, d, persistence);
+            let draw = TexelDraw::of(cell, h, d, [8.0, 40.0]);
             assert!((0.0..1.0).contains(&draw.pick));
             assert!(draw.place.iter().all(|v| (0.0..1.0).contains(v)));
-            counts[cumulative.partition_point(|c| *c <= draw.pick).min(39)] += 1;
+            // The light says which of the points was drawn: neighbours are half a unit of lightness apart.
+            let light = sampler.color(cell, h, d).map(|v| PI * f64::from(v));
+            let place = (Lab::from_rgb(light).l - 2.0) / 0.5;
+            assert!(
+                (place - place.round()).abs() < 0.01,
+                "between points: {place}"
+            );
+            counts[place.round() as usize] += 1;
         }
-        assert_drawn_from(&counts, &skewed(40), &format!("texels at {h}°, {d}°"));
+        assert_drawn_from(&counts, &slices[k], &format!("texels at {h}°, {d}°"));
     }
 }
 

@@ -255,11 +255,6 @@ fn a_field_is_refused_by_path_value_and_what_is_accepted() {
             vec!["multi_angle.rows[0]", "4 numbers"],
         ),
         (
-            "/multi_angle/columns",
-            json!(["aspecular_deg", "L", "a", "b", "L"]),
-            vec!["multi_angle.columns[4] is \"L\"", "no other column"],
-        ),
-        (
             "/multi_angle/illuminant",
             json!("A"),
             vec!["multi_angle.illuminant is \"A\"", "D65"],
@@ -272,6 +267,15 @@ fn a_field_is_refused_by_path_value_and_what_is_accepted() {
             "{pointer}: {text}"
         );
     }
+}
+
+#[test]
+fn a_column_named_twice_is_refused() {
+    let columns = json!(["aspecular_deg", "L", "a", "b", "L"]);
+    let text = refusal("/multi_angle/columns", columns);
+    let wanted =
+        "paint.json: multi_angle.columns[4] is \"L\", accepted is a name that no other column has";
+    assert_eq!(text, wanted);
 }
 
 #[test]

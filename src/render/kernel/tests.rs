@@ -92,25 +92,49 @@ proptest! {
 /// χ² over 8 bands of height and 8 of azimuth: how often directions are drawn against the integral of the density.
 #[test]
 fn drawn_directions_fall_where_their_density_says() {
-    for (coat, roughness) in [(true, 0.0), (true, 0.08), (false, 0.0)] {
-        let coat = coat.then_some(Coat {
-            ior: 1.5,
-            roughness,
-            thickness_um: None,
-        });
-        if coat.is_some() {
-            assert_drawn_by_density::<true>(&paint(coat));
-        } else {
-            assert_drawn_by_density::<false>(&paint(coat));
+    for height in [1.0, 0.7, 0.12] {
+        for (coat, roughness) in [(true, 0.0), (true, 0.08), (false, 0.0)] {
+            let coat = coat.then_some(Coat {
+                ior: 1.5,
+                roughness,
+                thickness_um: None,
+            });
+            if coat.is_some() {
+                assert_drawn_by_density::<true>(&paint(coat), height);
+            } else {
+                assert_drawn_by_density::<false>(&paint(coat), height);
+            }
         }
     }
 }
 
-fn assert_drawn_by_density<const COATED: bool>(paint: &CarPaint) {
+/// Integral of the density over each of 64 cells, by the midpoint rule with `steps` steps a side of each.
+fn integrated<const COATED: bool>(kernel: &Kernel<'_>, view: &View, steps: u32) -> Vec<f64> {
+    let part = |k: u32| (f64::from(k) + 0.5) / f64::from(steps);
+    let solid = std::f64::consts::TAU / 64.0 / f64::from(steps * steps);
+    let cell = |cell: usize| {
+        let mut density = 0.0;
+        for k in (0..steps * steps).step_by(WIDTH) {
+            let mut light = splat3([0.0; 3]);
+            for lane in 0..WIDTH {
+                let k = k + lane as u32;
+                let z = ((cell / 8) as f64 + part(k / steps)) / 8.0;
+                let turn = ((cell % 8) as f64 + part(k % steps)) / 8.0 * std::f64::consts::TAU;
+                set(&mut light, lane, direction(z, turn).map(|v| v as f32));
+            }
+            let answer = kernel.evaluate::<COATED, false>(view, light, &[0; WIDTH], None);
+            density += answer.density.0.iter().map(|d| f64::from(*d)).sum::<f64>();
+        }
+        density * solid
+    };
+    (0..64).map(cell).collect()
+}
+
+fn assert_drawn_by_density<const COATED: bool>(paint: &CarPaint, height: f64) {
     const DRAWS: u32 = 1 << 16;
     let mut kernel = Kernel::new(paint);
     kernel.draws = true;
-    let view = kernel.view::<COATED>(single(direction(0.7, 0.0)));
+    let view = kernel.view::<COATED>(single(direction(height, 0.3)));
     let points = super::super::points::Points::of_pixel(0, 0, DRAWS, 5);
     let mut counts = [0.0_f64; 64];
     for k in 0..DRAWS {
@@ -122,35 +146,45 @@ fn assert_drawn_by_density<const COATED: bool>(paint: &CarPaint) {
         let band = ((light[2] * 8.0) as usize).min(7);
         counts[8 * band + ((turn - turn.floor()) * 8.0).min(7.0) as usize] += 1.0;
     }
-    let (mut statistic, mut cells) = (0.0, 0.0);
-    for (cell, count) in counts.iter().enumerate() {
-        let mut density = 0.0;
-        let steps = 60_u32;
-        for k in 0..steps * steps {
-            let part = |k: u32| (f64::from(k) + 0.5) / f64::from(steps);
-            let z = ((cell / 8) as f64 + part(k / steps)) / 8.0;
-            let turn = ((cell % 8) as f64 + part(k % steps)) / 8.0 * std::f64::consts::TAU;
-            let light = single(direction(z, turn));
-            let answer = kernel.evaluate::<COATED, false>(&view, light, &[0; WIDTH], None);
-            density += f64::from(answer.density.0[0]);
-        }
-        let solid = std::f64::consts::TAU / 64.0 / f64::from(steps * steps);
-        let expected = density * solid * f64::from(DRAWS);
+    let (coarse, fine) = (
+        integrated::<COATED>(&kernel, &view, 128),
+        integrated::<COATED>(&kernel, &view, 256),
+    );
+    let total = fine.iter().sum::<f64>();
+    let (mut statistic, mut cells, mut off) = (0.0, 0.0, 0.0_f64);
+    let (mut rest, mut rarely) = (0.0_f64, 0.0_f64);
+    for ((count, fine), coarse) in counts.iter().zip(fine).zip(coarse) {
+        let expected = fine * f64::from(DRAWS);
         if expected >= 5.0 {
             statistic += (count - expected).powi(2) / expected;
             cells += 1.0;
+            // What halving the steps changes is three times what is left, in standard deviations of the count.
+            off = off.max((fine - coarse).abs() / 3.0 * f64::from(DRAWS) / expected.sqrt());
         } else {
-            assert!(
-                *count < 30.0,
-                "{count} draws where {expected} were expected"
-            );
+            rest += expected;
+            rarely += count;
         }
     }
-    // k + 6 √(2k); the midpoint rule on lobes of a few of its steps adds no more than that again.
-    let limit: f64 = 2.0 * (cells + 6.0 * f64::sqrt(2.0 * cells));
+    let (drawn, expected) = (counts.iter().sum::<f64>(), total * f64::from(DRAWS));
+    // Binomial, and what single precision does to a density: a density too small or too large everywhere shows here.
+    let scatter = (expected * (1.0 - total).max(0.0)).sqrt();
+    assert!(
+        (drawn - expected).abs() <= 6.0 * scatter + 1e-4 * f64::from(DRAWS),
+        "{height}: {drawn} directions of {expected}"
+    );
+    assert!(
+        off < 0.1,
+        "{height}: the integral is off by {off} standard deviations"
+    );
+    assert!(
+        (rarely - rest).abs() <= 6.0 * rest.sqrt().max(1.0),
+        "{height}: {rarely} rare draws of {rest}"
+    );
+    // Six standard deviations of chance, and the draws are spread more evenly than that.
+    let limit: f64 = cells + 6.0 * f64::sqrt(2.0 * cells);
     assert!(
         cells > 20.0 && statistic < limit,
-        "χ² {statistic} of {cells} cells"
+        "{height}: χ² {statistic} of {cells} cells"
     );
 }
 

@@ -96,9 +96,8 @@ async fn correspond(
             .iter()
             .filter_map(|paint| paint.file_of_paint())
             .collect();
-        works
-            .blend(&files, &profile, progress)
-            .map(|blend| Bytes::from(blend.to_bytes()))
+        let blend = works.blend(&files, &profile, progress)?;
+        Ok::<_, WorkError>(Bytes::from(blend.to_bytes()?))
     });
     let Ok(found) = found.await? else {
         return Err(Problem::new(

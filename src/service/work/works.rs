@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
-use crate::paint::PaintFile;
+use crate::paint::{NotFinite, PaintFile};
 use crate::workshop::Environment;
 
 /// Share done, from 0 to 1. It does not return when the work was called off.
@@ -129,6 +129,16 @@ pub struct WorkError {
     pub field: Option<String>,
     /// What is wrong, with the value and what would be accepted.
     pub message: String,
+}
+
+impl From<NotFinite> for WorkError {
+    fn from(error: NotFinite) -> Self {
+        Self {
+            fault: Fault::Internal,
+            field: None,
+            message: error.to_string(),
+        }
+    }
 }
 
 /// The pieces of work.

@@ -96,9 +96,9 @@ fn of_samples(
             whole,
         )
     };
-    let (encode_small, bytes_small) = timed(|| small.1.to_bytes().len() as f64);
-    let (encode_large, bytes_large) = timed(|| large.1.to_bytes().len() as f64);
-    let bytes = at(bytes_small, bytes_large);
+    let (encode_small, bytes_small) = timed(|| small.1.to_bytes().map(|file| file.len() as f64));
+    let (encode_large, bytes_large) = timed(|| large.1.to_bytes().map(|file| file.len() as f64));
+    let bytes = at(bytes_small?, bytes_large?);
     let mut stages: Vec<Stage> = sampled.iter().flat_map(|s| s.stages.clone()).collect();
     stages.push(Stage {
         stage: "blend",

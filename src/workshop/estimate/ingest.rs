@@ -41,15 +41,15 @@ pub(super) struct Sampled {
 pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, WorkshopError> {
     let sampled = sample(name, options, FEW_ANGLES)?;
     let whole = sampled.angles.map_or(1.0, |[h, d]| (h * d) as f64);
-    let size = |paint: &PaintFile| {
+    let size = |paint: &PaintFile| -> Result<_, WorkshopError> {
         let flakes = paint.paint.flakes.as_ref();
-        (
+        Ok((
             flakes.map_or(1.0, |f| f.slices() as f64),
-            paint.to_bytes().len() as f64,
-        )
+            paint.to_bytes()?.len() as f64,
+        ))
     };
     let [small, large] = &sampled.paints;
-    let bytes = extrapolated(size(small), size(large), whole);
+    let bytes = extrapolated(size(small)?, size(large)?, whole);
     let mut stages = sampled.stages;
     stages.push(Stage {
         stage: "write",

@@ -1,6 +1,6 @@
 //! Checks of what a paint does with light: reflectance, color, and the flakes that texels draw.
 
-use super::{Check, Subject};
+use super::{Check, Subject, worse};
 use crate::color::Lab;
 use crate::fit::Stream;
 use crate::paint::{Chi, Direction, FlakeSampler, HalfAngles, half_angles};
@@ -43,7 +43,7 @@ pub(super) fn reflectance(subject: &Subject<'_>) -> Vec<Check> {
         let lost = terms.is_none_or(|t| !t.base.iter().chain(&t.flakes).all(sound));
         wrong += usize::from(lost || !f.iter().all(|v| v.is_finite() && *v >= 0.0));
         for (f, g) in f.into_iter().zip(g) {
-            worst = worst.max((f - g).abs() / f.max(g).max(f64::MIN_POSITIVE));
+            worst = worse(worst, (f - g).abs() / f.max(g).max(f64::MIN_POSITIVE));
         }
     }
     let HalfAngles { theta_h, .. } =
@@ -66,6 +66,62 @@ pub(super) fn reflectance(subject: &Subject<'_>) -> Vec<Check> {
     ]
 }
 
+/// What the paint's certificate says against a second integration: polar angles around the mirror direction, in even steps
+/// of `t`, `ψ = w sinh t`, where the certificate goes round the normal.
+pub(super) fn energy(subject: &Subject<'_>) -> Vec<Check> {
+    let paint = subject.paint;
+    let lobes = paint.lobes.iter().filter(|lobe| !lobe.is_absent());
+    let coat = paint.coat.iter().filter(|coat| !coat.is_mirror());
+    let widths = lobes.map(|l| l.alpha).chain(coat.map(|c| c.roughness));
+    let narrowest = widths.fold(0.5, f64::min).max(1e-3);
+    let mut worst = 0.0;
+    for (degrees, stated) in subject
+        .energy
+        .incidence_deg
+        .iter()
+        .zip(&subject.energy.albedo)
+    {
+        // Beyond it half of a lobe is below the horizon, and its edge is not followed here.
+        if *degrees <= 65.0 {
+            let again = albedo(subject, degrees.to_radians(), narrowest);
+            worst = worse(worst, (again - stated).abs() / stated.max(1e-3));
+        }
+    }
+    vec![Check::at_most(
+        "albedo against the paint's energy certificate",
+        worst,
+        // Both rules meet the kinks of the paint's own tables between their nodes.
+        0.01,
+        "relative",
+    )]
+}
+
+/// Largest channel's albedo at an incidence.
+fn albedo(subject: &Subject<'_>, incidence: f64, narrowest: f64) -> f64 {
+    let (sine, cosine) = incidence.sin_cos();
+    let wi = [-sine, 0.0, cosine];
+    let (rings, spokes) = (240_u32, 96_u32);
+    let reach = (std::f64::consts::PI / narrowest).asinh();
+    let mut sum = [0.0; 3];
+    for ring in 0..rings {
+        let t = (f64::from(ring) + 0.5) / f64::from(rings) * reach;
+        let away = narrowest * t.sinh();
+        let step = reach / f64::from(rings) * narrowest * t.cosh();
+        for spoke in 0..spokes {
+            let turn = (f64::from(spoke) + 0.5) / f64::from(spokes) * std::f64::consts::TAU;
+            let (x, y, z) = (away.sin() * turn.cos(), away.sin() * turn.sin(), away.cos());
+            // Around the mirror direction, (sine, 0, cosine).
+            let wo = [cosine * x + sine * z, y, cosine * z - sine * x];
+            if wo[2] > 0.0 {
+                let f = subject.reflectance.evaluate(wi, wo, Chi::Table);
+                let weight = away.sin() * step * std::f64::consts::TAU / f64::from(spokes) * wo[2];
+                (0..3).for_each(|c| sum[c] += f[c] * weight);
+            }
+        }
+    }
+    sum.into_iter().fold(0.0, worse) + subject.reflectance.mirror(wi)
+}
+
 /// Lab to light and back, for every color of the paint.
 pub(super) fn color(subject: &Subject<'_>) -> Vec<Check> {
     let corners = subject.paint.flakes.iter().flat_map(|f| {
@@ -79,7 +135,7 @@ pub(super) fn color(subject: &Subject<'_>) -> Vec<Check> {
         let back = Lab::from_xyz(xyz, crate::color::D65_2).to_array();
         let size = lab.to_array().iter().fold(100.0_f64, |m, v| m.max(v.abs()));
         for (x, y) in back.iter().zip(lab.to_array()) {
-            worst = worst.max((x - y).abs() / (5.0 * size));
+            worst = worse(worst, (x - y).abs() / (5.0 * size));
         }
     }
     // f is kept to a few roundings; a and b are differences of it, times 500 and 200.
@@ -101,7 +157,8 @@ pub(super) fn probabilities(subject: &Subject<'_>) -> Vec<Check> {
         let slice = flakes.slice_at(k);
         #[allow(clippy::cast_precision_loss)] // a count of clusters
         let count = slice.probability.len() as f64;
-        worst = worst.max((slice.probability.iter().sum::<f64>() - 1.0).abs() / count);
+        let sum: f64 = slice.probability.iter().sum();
+        worst = worse(worst, (sum - 1.0).abs() / count);
     }
     vec![Check::at_most(
         "probabilities of a slice sum to 1",
@@ -141,7 +198,7 @@ pub(super) fn texels(subject: &Subject<'_>) -> Vec<Check> {
     });
     vec![Check::at_most(
         "mean of 100000 texels against the closed form",
-        off.fold(0.0, f64::max),
+        off.fold(0.0, worse),
         6.0,
         "standard errors",
     )]

@@ -48,7 +48,7 @@ pub(in crate::workshop::study) fn ingest(
             instrument = instrument.max(largest);
         }
         let mut point = point(of, seconds, worst);
-        point.bytes = Some(paint.to_bytes().len() as u64);
+        point.bytes = Some(paint.to_bytes()?.len() as u64);
         point
             .more
             .insert("ΔE2000 at an instrument".to_owned(), instrument);
