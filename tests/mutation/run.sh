@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Breaks the rooms color, transport, paint and blend in every way that cargo-mutants knows, and counts what the tests
-# notice. Arguments go to cargo-mutants, for example `--shard 0/8` or `--file src/color/lab.rs`.
+# notice. Arguments go to cargo-mutants, for example `--shard 0/8` or `--re src/color/lab.rs`.
 #
 # The four rooms need no other, so they are copied, with their unit tests and the part of the stability suite that is
 # about them, into a crate of their own in target/mutation, the suite compiled into the unit tests: a broken variant is
