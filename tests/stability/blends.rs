@@ -687,6 +687,45 @@ fn differing_grids_blend_on_their_union_and_keep_every_own_slice() {
     assert_eq!(blend.report().mixed.len(), 2);
 }
 
+/// One instrument writes a twenty-third of 66 degrees with four decimals, another with all: the same slice, no mixture.
+#[test]
+fn angles_that_were_rounded_otherwise_are_the_same_angles() {
+    let exact = [0.0, 66.0 / 23.0, 132.0 / 23.0];
+    let rounded = [0.0, 2.8696, 5.7391];
+    let made = |seed, angles: &[f64]| CarPaint {
+        color_table: table(angles, &[0.0, 45.0], seed),
+        ..metallic(seed, angles, &[0.0, 45.0])
+    };
+    let (a, b) = (made(63, &exact), made(64, &rounded));
+    let blend = blend(&[&a, &b]);
+    assert!(
+        blend.report().mixed.is_empty(),
+        "{:?}",
+        blend.report().mixed
+    );
+    for (weights, own) in [([1.0, 0.0], &a), ([0.0, 1.0], &b)] {
+        let mut end = realise(&blend, &weights).paint;
+        let (flakes, of_own) = (
+            end.flakes.as_mut().expect("has"),
+            own.flakes.as_ref().expect("has"),
+        );
+        let colors = &end.color_table;
+        for grid in [&flakes.theta_h, colors.theta_h()] {
+            assert!(grid.is_near(&of_own.theta_h), "{grid:?}");
+        }
+        // But for the last digits of its angles the blend's end is the paint, to the bit.
+        flakes.theta_h = of_own.theta_h.clone();
+        end.color_table = ColorTable::new(
+            of_own.theta_h.clone(),
+            colors.theta_d().clone(),
+            colors.nodes().to_vec(),
+            colors.overall(),
+        )
+        .expect("one color a node");
+        assert_is(&end, own, "rounded otherwise");
+    }
+}
+
 /// A color table on these angles, none of its colors like another.
 fn table(theta_h: &[f64], theta_d: &[f64], seed: u64) -> ColorTable {
     let mut random = Stream(seed);
