@@ -13,7 +13,7 @@ use carpaint::service::{
     Progress, Readings, ServiceConfig, Target, Thing, View, WorkError, Works, Workshop, open,
     serve,
 };
-use carpaint::workshop::{Environment, EstimatedError};
+use carpaint::workshop::{Environment, EstimatedError, sample_by_name};
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
@@ -209,6 +209,13 @@ pub struct House {
     served: JoinHandle<()>,
 }
 
+/// The file of a sample of few clusters.
+pub fn sample_file(name: &str) -> Vec<u8> {
+    let sample = sample_by_name(name).expect("a sample");
+    let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
+    paint.to_bytes().expect("finite")
+}
+
 impl House {
     pub async fn open(data: &Path) -> Self {
         Self::with(ServiceConfig::new(data.to_owned())).await
@@ -274,6 +281,16 @@ impl House {
             )
             .await;
         assert!([200, 201].contains(&answer.status), "{answer:?}");
+        answer.json()["id"].as_str().expect("an id").to_owned()
+    }
+
+    /// Uploads a sample as a file and gives its id; for a house with the real workshop.
+    pub async fn sample(&self, name: &str) -> String {
+        let headers = [("Prefer", "wait=300")];
+        let answer = self
+            .ask("POST", "/v1/paints", &headers, &sample_file(name))
+            .await;
+        assert_eq!(answer.status, 201, "{}", answer.text());
         answer.json()["id"].as_str().expect("an id").to_owned()
     }
 

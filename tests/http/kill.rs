@@ -6,11 +6,10 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use carpaint::accuracy::Profile;
-use carpaint::workshop::sample_by_name;
 use serde_json::{Value, json};
 
 use crate::client::{Answer, ask};
+use crate::house::sample_file;
 
 struct Program {
     child: Child,
@@ -72,19 +71,10 @@ impl Program {
     }
 }
 
-fn sample(name: &str) -> Vec<u8> {
-    let sample = sample_by_name(name).expect("a sample");
-    sample
-        .build(&Profile::draft(), &|_| ())
-        .expect("builds")
-        .to_bytes()
-        .expect("finite")
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn what_was_acknowledged_survives_a_kill() {
     let data = tempfile::tempdir().expect("temporary folder");
-    let (white, at_once) = (sample("white"), [("Prefer", "respond-async")]);
+    let (white, at_once) = (sample_file("white"), [("Prefer", "respond-async")]);
     let mut jobs = Vec::new();
     for round in 0..6 {
         let program = Program::start(data.path());
@@ -128,7 +118,7 @@ async fn the_same_bytes_come_after_a_kill_and_a_term_ends_it_quietly() {
             "POST",
             &format!("/v1/paints?name={name}"),
             &wait,
-            &sample(name),
+            &sample_file(name),
         )
         .await;
         assert_eq!(answer.status, 201, "{answer:?}");

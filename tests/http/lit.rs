@@ -2,9 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use carpaint::accuracy::Profile;
 use carpaint::service::ServiceConfig;
-use carpaint::workshop::sample_by_name;
 use serde_json::json;
 
 use crate::environments::{panorama, upload};
@@ -15,18 +13,7 @@ use crate::house::House;
 async fn a_picture_is_lit_by_the_panorama_that_is_asked_for() {
     let data = folder();
     let house = House::real(data.path()).await;
-    let sample = sample_by_name("white").expect("a sample");
-    let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
-    let headers = [("Prefer", "wait=300")];
-    let uploaded = house
-        .ask(
-            "POST",
-            "/v1/paints",
-            &headers,
-            &paint.to_bytes().expect("finite"),
-        )
-        .await;
-    let paint = uploaded.json()["id"].as_str().expect("an id").to_owned();
+    let paint = house.sample("white").await;
     let red = upload(&house, &panorama([128, 16, 16, 129]), 201).await;
     let blue = upload(&house, &panorama([16, 16, 128, 129]), 201).await;
     let lit = async |by: &str| {
@@ -163,15 +150,7 @@ async fn an_environment_beyond_todays_limits_is_told_by_its_limit() {
 async fn light_that_is_not_drawn_as_it_was_is_told_wherever_it_matters() {
     let data = folder();
     let house = House::real(data.path()).await;
-    let paint = sample_by_name("white").expect("a sample");
-    let paint = paint.build(&Profile::draft(), &|_| ()).expect("builds");
-    let headers = [("Prefer", "wait=300")];
-    let bytes = paint.to_bytes().expect("finite");
-    let uploaded = house.ask("POST", "/v1/paints", &headers, &bytes);
-    let paint = uploaded.await.json()["id"]
-        .as_str()
-        .expect("an id")
-        .to_owned();
+    let paint = house.sample("white").await;
     // 128/256 times 2^(148 - 128) is 2^19 in one channel of each of 32 pixels.
     let sun = panorama([128, 0, 0, 148]);
     let sky = upload(&house, &sun, 201).await;

@@ -2,8 +2,6 @@
 
 use std::time::Duration;
 
-use carpaint::accuracy::Profile;
-use carpaint::workshop::sample_by_name;
 use serde_json::json;
 
 use crate::folder;
@@ -84,19 +82,7 @@ async fn angles_are_the_same_for_every_paint_and_other_than_the_paint() {
     let house = House::real(data.path()).await;
     let mut paints = Vec::new();
     for name in ["white", "2k_acrylack"] {
-        let sample = sample_by_name(name).expect("a sample");
-        let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
-        let headers = [("Prefer", "wait=300")];
-        let uploaded = house
-            .ask(
-                "POST",
-                "/v1/paints",
-                &headers,
-                &paint.to_bytes().expect("finite"),
-            )
-            .await;
-        assert_eq!(uploaded.status, 201, "{}", uploaded.text());
-        paints.push(uploaded.json()["id"].as_str().expect("an id").to_owned());
+        paints.push(house.sample(name).await);
     }
     let blend = house.blend(&[&paints[0], &paints[1]]).await;
     let query = "size=48x32&show=aspecular";
