@@ -13,8 +13,8 @@ use super::preview::FrameArgs;
 use super::profile::TargetArgs;
 use super::weights::WeightArgs;
 use crate::workshop::{
-    Estimate as Estimated, Format, IngestOptions, PictureFormat, PreviewOptions, Show, Stage, Work,
-    WorkshopError, open, sample_to_estimate,
+    Estimate as Estimated, Format, IngestOptions, PictureFormat, PictureWork, PreviewOptions, Show,
+    Stage, Work, WorkshopError, open, sample_to_estimate,
 };
 
 /// Estimate seconds, bytes and error of a command before running it.
@@ -181,14 +181,14 @@ impl Estimate {
                     environment: None,
                     lights: None,
                 };
-                let work = Work::Preview {
+                let work = Work::Preview(PictureWork {
                     thing: &thing,
                     weights: weights.as_ref(),
                     options: &view,
                     format: PictureFormat::Png,
                     limits: &options.limits,
                     written: true,
-                };
+                });
                 let estimate = match args.pick(&work)? {
                     Some(picked) => {
                         eprintln!("target {}", picked.line());

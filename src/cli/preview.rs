@@ -13,8 +13,8 @@ use super::profile::TargetArgs;
 use super::progress::Progress;
 use super::weights::WeightArgs;
 use crate::workshop::{
-    PictureFormat, PreviewOptions, Shape, Show, Source, Work, WorkshopError, find, open, preview,
-    read_environment,
+    PictureFormat, PictureWork, PreviewOptions, Shape, Show, Source, Work, WorkshopError, find,
+    open, preview, read_environment,
 };
 
 /// Draw a paint, a blend at given weights, or a sample.
@@ -196,14 +196,14 @@ impl Preview {
             environment,
             lights: None,
         };
-        let picked = self.target.pick(&Work::Preview {
+        let picked = self.target.pick(&Work::Preview(PictureWork {
             thing: &thing,
             weights: weights.as_ref(),
             options: &wanted,
             format,
             limits: &options.limits,
             written: true,
-        })?;
+        }))?;
         if let Some(picked) = &picked {
             wanted.samples_per_pixel = picked.profile().samples_per_pixel;
         }

@@ -15,7 +15,7 @@ use super::http::Problem;
 use super::metrics::Metrics;
 use super::shelf::Shelved;
 use super::uploading::Uploading;
-use super::work::{Jobs, Watchers, Workbench, Works};
+use super::work::{Jobs, Picks, Watchers, Workbench, Works};
 use crate::store::{Blobs, Catalogue, FolderBlobs, ResultCache, SqliteCatalogue, StoreError};
 
 /// A running service, shared by its handlers.
@@ -36,6 +36,8 @@ pub struct Shared {
     pub results: ResultCache<Problem>,
     /// Where requests compute.
     pub bench: Workbench,
+    /// What was picked for targets.
+    pub picks: Picks,
     /// Jobs under way.
     pub jobs: Jobs,
     /// Who waits for pictures.
@@ -113,6 +115,7 @@ impl App {
             catalogue: Arc::new(catalogue),
             results,
             bench: Workbench::new(processors, config.most_waiting),
+            picks: Picks::default(),
             jobs: Jobs::new(processors.div_ceil(2), config.most_jobs),
             watchers: Watchers::default(),
             metrics: Metrics::new(),

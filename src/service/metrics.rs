@@ -25,6 +25,8 @@ pub struct Metrics {
     pub blend_bundles_computed: Counter,
     /// Pictures that were rendered, not taken from the cache.
     pub previews_rendered: Counter,
+    /// Targets that a profile was searched for, not taken from memory.
+    pub targets_searched: Counter,
 }
 
 impl std::fmt::Debug for Metrics {
@@ -68,6 +70,10 @@ impl Metrics {
             "carpaint_previews_rendered_total",
             "Pictures that were rendered",
         );
+        let targets_searched = counter(
+            "carpaint_targets_searched_total",
+            "Targets that a profile was searched for",
+        );
         recorder.describe_histogram(
             "carpaint_http_request_seconds".into(),
             Some(Unit::Seconds),
@@ -82,6 +88,7 @@ impl Metrics {
             realisations_computed,
             blend_bundles_computed,
             previews_rendered,
+            targets_searched,
         }
     }
 

@@ -1,12 +1,14 @@
 //! A target in place of knobs: the cheapest profile that is accurate enough, or the most accurate that is fast enough.
 //!
-//! The profiles of a short ladder are estimated on the work itself, from cheap to dear until one will do; where an estimate's error is of a sample of the
-//! slices, the error is measured in full before a profile is picked for it. What is picked for a time limit depends on
-//! the machine; the result depends on the profile picked and on nothing else.
+//! The profiles of a short ladder are estimated on the work itself, from cheap to dear until one will do; where an
+//! estimate's error is of a sample of the slices, the error is measured in full before a profile is picked for it. What
+//! is picked for a time limit depends on the machine; the result depends on the profile picked and on nothing else.
+
+use std::time::Instant;
 
 use serde::Serialize;
 
-use super::estimate::{Estimate, Work};
+use super::estimate::{Estimate, Work, estimate_preview};
 use super::realising::{Format, choose, error_of};
 use super::{MOST_SAMPLES, WorkshopError, blend_paints};
 use crate::accuracy::{Profile, blend_error, file_error, writing_error};
@@ -19,7 +21,7 @@ pub struct Target {
     /// Largest error: Lab for flakes, CIEDE2000 for pictures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_error: Option<f64>,
-    /// Longest time, seconds.
+    /// Longest time, seconds: of the search for a profile and of the work with it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_seconds: Option<f64>,
 }
@@ -35,6 +37,8 @@ pub struct Picked {
     pub estimate: Estimate,
     /// How many profiles were looked at, from cheap to dear.
     pub tried: usize,
+    /// Seconds that took.
+    pub searched: f64,
 }
 
 impl Picked {
@@ -85,10 +89,17 @@ impl Target {
         Ok(())
     }
 
-    fn is_met(&self, estimate: &Estimate) -> bool {
-        self.max_error
-            .is_none_or(|most| estimate.error.value.is_some_and(|error| error <= most))
-            && self.max_seconds.is_none_or(|most| estimate.seconds <= most)
+    /// Whether work is done in time after a search of so many seconds.
+    fn is_in_time(&self, estimate: &Estimate, searched: f64) -> bool {
+        self.max_seconds
+            .is_none_or(|most| searched + estimate.seconds <= most)
+    }
+
+    fn is_met(&self, estimate: &Estimate, searched: f64) -> bool {
+        self.is_in_time(estimate, searched)
+            && self
+                .max_error
+                .is_none_or(|most| estimate.error.value.is_some_and(|error| error <= most))
     }
 
     /// Picks a profile for some work.
@@ -98,36 +109,65 @@ impl Target {
     /// [`WorkshopError`] for limits that are none, and for what would be refused when the work is done.
     pub fn pick(&self, work: &Work<'_>) -> Result<Picked, WorkshopError> {
         self.check()?;
-        let mut estimates = Vec::new();
-        // From cheap to dear: what comes after one that is accurate enough, or too slow, need not be looked at.
-        for profile in ladder(work) {
-            let mut estimate = work.estimate(&profile)?;
-            let too_slow = self.max_seconds.is_some_and(|most| estimate.seconds > most);
+        let begun = Instant::now();
+        let searched = || begun.elapsed().as_secs_f64();
+        let mut small_pictures = None;
+        let mut look = |profile: &Profile| {
+            let mut estimate = match work {
+                Work::Preview(picture) => {
+                    estimate_preview(picture, profile, Some(&mut small_pictures))
+                }
+                _ => work.estimate(profile),
+            }?;
+            let too_slow = !self.is_in_time(&estimate, searched());
             if self.max_error.is_some() && !too_slow {
-                measure_error(work, &profile, &mut estimate)?;
+                measure_error(work, profile, &mut estimate)?;
             }
-            let enough = self.max_error.is_some() && self.is_met(&estimate);
-            estimates.push(estimate);
-            if enough || too_slow {
-                break;
+            let enough = self.max_error.is_some() && self.is_met(&estimate, searched());
+            Ok::<_, WorkshopError>((estimate, enough, too_slow))
+        };
+        let (ladder, first) = ladder(work);
+        let (estimate, mut enough, mut too_slow) = look(&ladder[first])?;
+        let mut estimates = vec![estimate];
+        if enough || too_slow {
+            // Cheaper ones, as long as they are accurate enough, or until one is in time; when the time is up already, the
+            // cheapest.
+            let late = self.max_seconds.is_some_and(|most| searched() > most);
+            let skipped = if late { first.saturating_sub(1) } else { 0 };
+            for profile in ladder[..first].iter().rev().skip(skipped) {
+                let (estimate, still_enough, still_too_slow) = look(profile)?;
+                estimates.insert(0, estimate);
+                if (enough && !still_enough) || (too_slow && !still_too_slow) {
+                    break;
+                }
+            }
+        } else {
+            // Dearer ones: what comes after one that is accurate enough, or too slow, need not be looked at.
+            for profile in &ladder[first + 1..] {
+                let estimate;
+                (estimate, enough, too_slow) = look(profile)?;
+                estimates.push(estimate);
+                if enough || too_slow {
+                    break;
+                }
             }
         }
-        let tried = estimates.len();
+        let (tried, searched) = (estimates.len(), searched());
         let estimate = self
-            .best(estimates)
+            .best(estimates, searched)
             .ok_or_else(|| WorkshopError::internal("there is no profile to pick from"))?;
         Ok(Picked {
             target: *self,
-            met: self.is_met(&estimate),
+            met: self.is_met(&estimate, searched),
             estimate,
             tried,
+            searched,
         })
     }
 
-    /// With a largest error the fastest that meets all, with a longest time alone the most accurate; where none does, the
-    /// most accurate in time, and where none is in time, the fastest.
-    fn best(&self, estimates: Vec<Estimate>) -> Option<Estimate> {
-        let faster = |x: &Estimate, y: &Estimate| x.seconds.total_cmp(&y.seconds);
+    /// Of estimates from cheap to dear: with a largest error the cheapest that meets all, with a longest time alone the
+    /// most accurate; where none does, the most accurate in time, and where none is in time, the cheapest.
+    fn best(&self, estimates: Vec<Estimate>, searched: f64) -> Option<Estimate> {
         let error_of = |e: &Estimate| e.error.value.unwrap_or(f64::INFINITY);
         let finer = |x: &Estimate, y: &Estimate| {
             error_of(x)
@@ -135,30 +175,30 @@ impl Target {
                 .then(x.seconds.total_cmp(&y.seconds))
         };
         let in_time: Vec<Estimate> = (estimates.iter())
-            .filter(|e| self.max_seconds.is_none_or(|most| e.seconds <= most))
+            .filter(|e| self.is_in_time(e, searched))
             .cloned()
             .collect();
         if in_time.is_empty() {
-            return estimates.into_iter().min_by(faster);
+            return estimates.into_iter().next();
         }
-        let met = in_time.iter().filter(|e| self.is_met(e));
-        let fastest = met.min_by(|x, y| faster(x, y)).cloned();
-        match (fastest, self.max_error) {
-            (Some(fastest), Some(_)) => Some(fastest),
+        let cheapest = in_time.iter().find(|e| self.is_met(e, searched)).cloned();
+        match (cheapest, self.max_error) {
+            (Some(cheapest), Some(_)) => Some(cheapest),
             _ => in_time.into_iter().min_by(finer),
         }
     }
 }
 
-/// Profiles to pick from, by what the work's accuracy depends on.
-fn ladder(work: &Work<'_>) -> Vec<Profile> {
+/// Profiles to pick from, by what the work's accuracy depends on, from cheap to dear, and the place of the one to look at
+/// first.
+fn ladder(work: &Work<'_>) -> (Vec<Profile>, usize) {
     let standard = Profile::standard();
     let clustered = |clusters, angle_step| ClusterSettings {
         clusters,
         angle_step,
         ..standard.flakes
     };
-    match work {
+    let profiles = match work {
         Work::Ingest { .. } => [
             (24, 2),
             (12, 1),
@@ -204,10 +244,10 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
                 ..standard
             })
             .collect(),
-        Work::Preview { options, .. } => [1, 4, 16, 64, 256, 1024]
+        Work::Preview(picture) => [1, 4, 16, 64, 256, 1024]
             .into_iter()
             .filter(|samples| {
-                let [width, height] = options.size.map(u64::from);
+                let [width, height] = picture.options.size.map(u64::from);
                 *samples == 1 || width * height * u64::from(*samples) <= MOST_SAMPLES
             })
             .map(|samples_per_pixel| Profile {
@@ -215,7 +255,13 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
                 ..standard
             })
             .collect(),
-    }
+    };
+    // The small pictures that tell how long 16 samples take tell it of all above.
+    let first = match work {
+        Work::Preview(_) => profiles.len().min(3) - 1,
+        _ => 0,
+    };
+    (profiles, first)
 }
 
 /// Replaces an error that was estimated on some slices by the one of all.
@@ -242,7 +288,7 @@ fn measure_error(
             estimate.error.value = file_error(&error_of(thing, weights), writing.as_ref()).lab;
         }
         // Ingest and preview are compared on the very slices and pixels that the result is compared on.
-        Work::Ingest { .. } | Work::BlendNames { .. } | Work::Preview { .. } => {}
+        Work::Ingest { .. } | Work::BlendNames { .. } | Work::Preview(_) => {}
     }
     Ok(())
 }
@@ -279,20 +325,24 @@ mod tests {
                 estimate(4.0, 0.2),
             ]
         };
-        let best = |max_error, max_seconds| {
+        let after = |searched, max_error, max_seconds| {
             let target = Target {
                 max_error,
                 max_seconds,
             };
-            let best = target.best(ladder()).expect("one of four");
-            (best.seconds, target.is_met(&best))
+            let best = target.best(ladder(), searched).expect("one of four");
+            (best.seconds, target.is_met(&best, searched))
         };
+        let best = |max_error, max_seconds| after(0.0, max_error, max_seconds);
         assert_eq!(best(Some(0.5), None), (2.0, true));
         assert_eq!(best(Some(0.6), Some(2.5)), (2.0, true));
         assert_eq!(best(None, Some(3.5)), (3.0, true));
         assert_eq!(best(None, Some(0.5)), (1.0, false));
         assert_eq!(best(Some(0.1), None), (3.0, false));
         assert_eq!(best(Some(0.1), Some(2.0)), (2.0, false));
+        // The search is part of what is waited for.
+        assert_eq!(after(1.0, None, Some(3.5)), (2.0, true));
+        assert_eq!(after(3.0, None, Some(3.5)), (1.0, false));
     }
 
     #[test]

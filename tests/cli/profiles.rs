@@ -95,6 +95,33 @@ fn a_target_names_the_profile_that_was_picked_for_it() {
     assert!(desk.refused(2, &realise("0")).contains("--max-error"));
 }
 
+#[test]
+fn a_picture_takes_the_fewest_samples_that_are_enough() {
+    let desk = Desk::new();
+    let picked = |target: [&'static str; 2]| {
+        let words = [
+            "preview",
+            "sample:white",
+            "--size",
+            "24x24",
+            "--json",
+            "--out",
+            "p.png",
+        ];
+        let made = json(&desk.ok(&[&words[..], &target].concat()).stdout);
+        let samples = &made["picked"]["estimate"]["knobs"]["samples_per_pixel"];
+        (
+            made["picked"]["met"] == true,
+            samples.as_u64().expect("samples"),
+        )
+    };
+    assert_eq!(picked(["--max-error", "100"]), (true, 1));
+    assert_eq!(picked(["--max-error", "1e-9"]), (false, 1024));
+    assert_eq!(picked(["--max-seconds", "1e-6"]), (false, 1));
+    let (met, samples) = picked(["--max-error", "1"]);
+    assert!(met && (1..=1024).contains(&samples), "{samples}");
+}
+
 /// Coarse, since other tests run beside it; `tests/bench/estimates.rs` is the fine one.
 #[test]
 fn an_estimate_is_of_the_order_of_what_then_happens() {

@@ -187,6 +187,7 @@ impl Works for Pretend {
             met: true,
             estimate: self.estimate(asked, &profile)?,
             tried: 2,
+            searched: 0.0,
         })
     }
 

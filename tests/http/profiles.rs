@@ -125,3 +125,84 @@ async fn profiles_are_names_or_knobs_and_targets_are_answered_with_what_was_pick
     );
     house.close().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_target_is_searched_for_once_and_told_in_the_answer() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let (a, b) = (house.paint("silver").await, house.paint("blue").await);
+    let blend = json!({ "paints": [a, b], "max_error": 0.5 }).to_string();
+    let (first, again) = tokio::join!(
+        house.post_json("/v1/blends", &blend),
+        house.post_json("/v1/blends", &blend)
+    );
+    for answer in [&first, &again] {
+        let target = &answer.json()["target"];
+        assert_eq!(target["asked"], json!({ "max_error": 0.5 }), "{target}");
+        assert_eq!(
+            (&target["met"], &target["profile"]),
+            (&json!(true), &json!("reference"))
+        );
+        assert_eq!(target["error"], json!({ "value": 0.25, "unit": "Lab" }));
+    }
+    let later = house.post_json("/v1/blends", &blend).await;
+    assert_eq!(
+        (later.status, &later.json()["target"]["met"]),
+        (200, &json!(true))
+    );
+    assert_eq!(house.count("carpaint_targets_searched_total").await, 1.0);
+    // What is told to everybody says nothing of one caller's target.
+    let id = first.json()["id"].as_str().expect("an id").to_owned();
+    let shown = house.get(&format!("/v1/blends/{id}")).await.json();
+    assert_eq!(shown.get("target"), None);
+
+    let at_once = [("Prefer", "respond-async")];
+    let job = house
+        .ask("POST", "/v1/paints?max_error=0.5", &at_once, b"red")
+        .await;
+    assert_eq!(
+        (job.status, &job.json()["target"]["met"]),
+        (202, &json!(true)),
+        "{}",
+        job.text()
+    );
+
+    let scene = |more: serde_json::Value| {
+        let mut scene = json!({ "paint": a, "size": [8, 8] });
+        let more = more.as_object().expect("an object").clone();
+        scene.as_object_mut().expect("an object").extend(more);
+        scene.to_string()
+    };
+    let before = house.count("carpaint_targets_searched_total").await;
+    for _ in 0..2 {
+        let drawn = scene(json!({ "max_seconds": 2 }));
+        let drawn = house.post_json("/v1/previews", &drawn).await;
+        assert_eq!(drawn.status, 200, "{}", drawn.text());
+        assert!(
+            drawn
+                .header("carpaint-target")
+                .is_some_and(|t| t.contains("draft"))
+        );
+    }
+    let searched = house.count("carpaint_targets_searched_total").await - before;
+    assert_eq!(
+        searched, 1.0,
+        "a picture that is kept is not searched for again"
+    );
+    for (wrong, pointer) in [
+        (json!({ "max_seconds": 0 }), "/max_seconds"),
+        (json!({ "max_error": 1, "profile": "draft" }), "/max_error"),
+        (
+            json!({ "max_seconds": 1, "samples_per_pixel": 4 }),
+            "/max_seconds",
+        ),
+        (
+            json!({ "max_seconds": 1, "show": "aspecular" }),
+            "/max_seconds",
+        ),
+    ] {
+        let refused = house.post_json("/v1/previews", &scene(wrong)).await;
+        assert_eq!(refused.problem(422, "invalid-value")["pointer"], pointer);
+    }
+    house.close().await;
+}

@@ -12,7 +12,7 @@ use super::answer::{Answer, Keep};
 use super::kind::Kind;
 use super::problem::Problem;
 use crate::service::app::App;
-use crate::service::work::runner;
+use crate::service::work::{JobDocument, Picked, TargetDocument, runner};
 use crate::store::JobState;
 
 /// The `Prefer` header (RFC 7240): `wait=N` seconds, or `respond-async` for none.
@@ -63,7 +63,8 @@ fn wait(preference: &str) -> Option<Duration> {
 }
 
 impl Prefer {
-    /// The answer to who asked for what a job makes: the thing itself, the problem, or the job when it takes longer.
+    /// The answer to who asked for what a job makes: the thing itself, the problem, or the job when it takes longer, with
+    /// what was picked for a target.
     ///
     /// # Errors
     ///
@@ -73,6 +74,7 @@ impl Prefer {
         app: &App,
         job: &str,
         address: &str,
+        picked: Option<&Picked>,
         made: impl FnOnce() -> F,
     ) -> Result<Response, Problem>
     where
@@ -95,9 +97,13 @@ impl Prefer {
                     "Somebody cancelled this while it was waited for.",
                 ));
             }
-            JobState::Queued | JobState::Running => Answer::json(&job, Keep::Never)
-                .status(StatusCode::ACCEPTED)
-                .location(&format!("/v1/jobs/{}", job.id)),
+            JobState::Queued | JobState::Running => {
+                let address = format!("/v1/jobs/{}", job.id);
+                let target = picked.map(TargetDocument::of);
+                Answer::json(&JobDocument { target, ..job }, Keep::Never)
+                    .status(StatusCode::ACCEPTED)
+                    .location(&address)
+            }
         };
         let answer = answer.stage("job", waited);
         let applied = match self.wait {

@@ -1,13 +1,16 @@
 //! Targets in requests, and what was picked for them in answers.
 //!
 //! `Carpaint-Target` says whether the target is met, with which profile, and what was estimated: it depends on the
-//! machine, so it stands in a header and never in the bytes of a result.
+//! machine, so it stands in a header and never in the bytes of a result. Who posts is told the same as `target` in the
+//! JSON of the answer, which is no result.
 
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::Response;
+use serde_json::{Map, Value};
 
-use crate::service::http::{Answer, Problem};
-use crate::service::work::{Picked, Target, WorkError};
+use crate::service::http::{Answer, Keep, Problem};
+use crate::service::shelf::Shelved;
+use crate::service::work::{Picked, Target, TargetDocument, WorkError};
 
 const TARGET: HeaderName = HeaderName::from_static("carpaint-target");
 
@@ -23,7 +26,7 @@ pub fn of_query(
 ) -> Result<Target, Problem> {
     let target = checked(max_error, max_seconds, WorkError::of_query)?;
     match (target.is_some() && knobs, field(&target)) {
-        (true, field) => Err(Problem::parameter(field, beside(field)).accepting(EITHER)),
+        (true, field) => Err(Problem::parameter(field, beside_knobs(field)).accepting(EITHER)),
         _ => Ok(target),
     }
 }
@@ -40,14 +43,16 @@ pub fn of_body(
 ) -> Result<Target, Problem> {
     let target = checked(max_error, max_seconds, WorkError::of_body)?;
     match (target.is_some() && knobs, field(&target)) {
-        (true, field) => Err(Problem::value(format!("/{field}"), beside(field)).accepting(EITHER)),
+        (true, field) => {
+            Err(Problem::value(format!("/{field}"), beside_knobs(field)).accepting(EITHER))
+        }
         _ => Ok(target),
     }
 }
 
 const EITHER: &str = "a target or knobs, not both";
 
-fn beside(field: &str) -> String {
+fn beside_knobs(field: &str) -> String {
     format!("{field} stands beside knobs.")
 }
 
@@ -72,6 +77,22 @@ fn checked(
         .check()
         .map(|()| target)
         .map_err(|error| problem(error.into()))
+}
+
+/// What is told about a paint or a blend, with what was picked for it.
+///
+/// # Errors
+///
+/// [`Problem`] when what is told is no object, which it is.
+pub fn told_with(thing: &Shelved, picked: Option<&Picked>) -> Result<Answer, Problem> {
+    let Some(picked) = picked else {
+        return Ok(thing.told());
+    };
+    let mut document: Map<String, Value> =
+        serde_json::from_slice(&thing.document.bytes).map_err(Problem::internal)?;
+    let target = serde_json::to_value(TargetDocument::of(picked)).map_err(Problem::internal)?;
+    document.insert("target".to_owned(), target);
+    Ok(Answer::json(&document, Keep::Never))
 }
 
 /// A response that says what was picked.

@@ -14,7 +14,9 @@ use crate::service::app::App;
 use crate::service::environments::{self, STUDIO, Unread};
 use crate::service::http::{Place, Problem};
 use crate::service::shelf::Shelved;
-use crate::service::work::{Asked, Light, Picked, PictureFormat, Shape, Show, View, WorkError};
+use crate::service::work::{
+    Asked, Light, Picked, PictureFormat, Shape, Show, Target, View, WorkError,
+};
 use crate::workshop::MOST_SAMPLES;
 
 /// Longest side of a picture.
@@ -150,25 +152,49 @@ impl ViewQuery {
             return Ok((self.view(app, self.spp, environment)?, None));
         }
         // How many samples it takes is yet to be found.
-        let mut view = self.view(app, Some(1), environment)?;
-        let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(thing), weights.cloned());
-        let wanted = view.clone();
-        let unread = app.unread(view.environment.as_deref()).await?;
-        let found = app.bench.run(move || {
-            let environment = unread.as_ref().map(Unread::read).transpose()?;
-            let asked = Asked::Preview {
-                thing: &thing.thing,
-                weights: weights.as_ref(),
-                view: &wanted,
-                environment: environment.as_deref(),
-                format,
-            };
-            works.pick(&asked, &target).map_err(WorkError::of_query)
-        });
-        let found = found.await??;
-        view.samples_per_pixel = found.profile().samples_per_pixel;
-        Ok((view, Some(found)))
+        let view = self.view(app, Some(1), environment)?;
+        let found = picked(app, thing, weights, (view, format), target).await?;
+        Ok((found.0, Some(found.1)))
     }
+}
+
+/// A view with the samples that meet a target.
+///
+/// # Errors
+///
+/// [`Problem`] for weights that are refused, and when too many wait to compute.
+pub async fn picked(
+    app: &App,
+    thing: &Arc<Shelved>,
+    weights: Option<&RealisationWeights>,
+    (mut view, format): (View, PictureFormat),
+    target: Target,
+) -> Result<(View, Picked), Problem> {
+    let whole = (
+        &thing.id,
+        thing.file.to_string(),
+        weights,
+        &view,
+        format,
+        target,
+    );
+    let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(thing), weights.cloned());
+    let wanted = view.clone();
+    let unread = app.unread(view.environment.as_deref()).await?;
+    let found = app.pick(&whole, move || {
+        let environment = unread.as_ref().map(Unread::read).transpose()?;
+        let asked = Asked::Preview {
+            thing: &thing.thing,
+            weights: weights.as_ref(),
+            view: &wanted,
+            environment: environment.as_deref(),
+            format,
+        };
+        works.pick(&asked, &target).map_err(WorkError::of_query)
+    });
+    let found = found.await?;
+    view.samples_per_pixel = found.profile().samples_per_pixel;
+    Ok((view, found))
 }
 
 /// How a request calls what makes a view.

@@ -150,11 +150,12 @@ async fn pick(app: &App, ids: &[String], target: Target) -> Result<Picked, Probl
         shelved.push(app.paint(id).await?);
     }
     let works = Arc::clone(&app.works);
-    let picked = app.bench.run(move || {
+    let pick = move || {
         let paints: Vec<&PaintFile> = shelved.iter().filter_map(|p| p.file_of_paint()).collect();
-        works.pick(&Asked::Blend { paints: &paints }, &target)
-    });
-    picked.await?.map_err(WorkError::of_body)
+        let asked = Asked::Blend { paints: &paints };
+        works.pick(&asked, &target).map_err(WorkError::of_body)
+    };
+    app.pick(&("blend", ids, target), pick).await
 }
 
 /// What is known about a blend.

@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
 
 use super::visibility::Visibility;
-use crate::service::work::BlendOptions;
+use crate::service::work::{BlendOptions, TargetDocument};
 use crate::store::{CachedResult, Hash, PaintRecord};
 
 /// A paint: everything known about it.
@@ -50,6 +50,9 @@ pub struct PaintDocument {
     pub warnings: Vec<String>,
     /// Whether lists show it.
     pub visibility: Visibility,
+    /// In the answer to a request with a target: what was picked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<TargetDocument>,
     /// Addresses of what can be made of it.
     #[schema(value_type = Object)]
     pub links: Value,
@@ -79,6 +82,9 @@ pub struct BlendDocument {
     /// What was asked for.
     #[schema(value_type = Object)]
     pub request: Value,
+    /// In the answer to a request with a target: what was picked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<TargetDocument>,
     /// Addresses of what can be made of it.
     #[schema(value_type = Object)]
     pub links: Value,

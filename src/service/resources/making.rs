@@ -27,10 +27,10 @@ pub async fn answer<F>(
 where
     F: Future<Output = Result<Arc<Shelved>, Problem>>,
 {
-    let told = async || Ok(made().await?.told());
+    let told = async || targets::told_with(&*made().await?, picked);
     let answer = match job {
         None => told().await?.location(address).into_response(),
-        Some(job) => prefer.answer(app, &job, address, told).await?,
+        Some(job) => prefer.answer(app, &job, address, picked, told).await?,
     };
     Ok(targets::told(answer, picked))
 }

@@ -15,7 +15,7 @@ use crate::service::http::{
 };
 use crate::service::ids;
 use crate::service::parameters::view::{self, Side, ViewQuery};
-use crate::service::parameters::{ProfileDocument, ProfileText, WeightQuery};
+use crate::service::parameters::{ProfileDocument, ProfileText, WeightQuery, targets};
 use crate::service::shelf::Shelved;
 use crate::service::work::drawing::{self, Drawn};
 use crate::service::work::{Light, Picked, PictureFormat, Shape, Show, View};
@@ -128,7 +128,7 @@ pub struct PreviewOrder {
     /// What the paint is on, `sphere` unless given.
     scene: Option<Shape>,
     /// What is shown on it, `paint` unless given. `aspecular` is the same for every paint and weights, and takes neither
-    /// `samples_per_pixel` nor `profile`.
+    /// `samples_per_pixel`, `profile`, `max_error` nor `max_seconds`.
     show: Option<Show>,
     /// Width and height in pixels, 512 and 512 unless given.
     #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
@@ -146,6 +146,12 @@ pub struct PreviewOrder {
     /// Accuracy: the name of a preset, or an object of knobs.
     #[schema(value_type = Option<ProfileDocument>)]
     profile: Option<ProfileText>,
+    /// In place of a profile: the cheapest whose mean error by sampling is at most this, CIEDE2000.
+    #[schema(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[schema(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
     /// What is sent, `png` unless given.
     format: Option<PreviewFormat>,
 }
@@ -172,13 +178,18 @@ pub async fn create(
     let sampled = [
         ("samples_per_pixel", order.samples_per_pixel.is_some()),
         ("profile", order.profile.is_some()),
+        ("max_error", order.max_error.is_some()),
+        ("max_seconds", order.max_seconds.is_some()),
     ];
     view::refuse_samples_of_angles(show, &sampled, &view::Names::BODY)?;
+    let knobs = order.profile.is_some() || order.samples_per_pixel.is_some();
+    let target = targets::of_body(order.max_error, order.max_seconds, knobs)?;
     let (thing, weights) = order.thing(&app).await?;
     let asked = order.profile.clone().unwrap_or_default();
     asked.fits(&thing).map_err(Problem::in_body)?;
     let profile = asked.of_body()?;
-    let spp = order.samples_per_pixel;
+    // How many samples it takes to meet a target is found once everything else is known to be right.
+    let spp = order.samples_per_pixel.or(target.is_some().then_some(1));
     let environment =
         view::environment(&app, order.environment.as_deref(), &view::Names::BODY).await?;
     let asked = View {
@@ -192,10 +203,23 @@ pub async fn create(
     let view = view::view(&app, asked, &view::Names::BODY)?;
     let format = order.format.unwrap_or(PreviewFormat::Png);
     let whole = (&thing.id, &weights, &view, format);
-    let claimed = ids::asked("preview", &whole);
+    let claimed = if target.is_some() {
+        ids::asked("preview", &(whole, target))
+    } else {
+        ids::asked("preview", &whole)
+    };
     idempotency.claim(&app, &claimed).await?;
+    let (view, picked) = if target.is_some() {
+        let sent = format.drawn();
+        let found = view::picked(&app, &thing, weights.as_ref(), (view, sent), target).await;
+        let (view, picked) = found.map_err(Problem::in_body)?;
+        (view, Some(picked))
+    } else {
+        (view, None)
+    };
     let drawn = drawing::draw(&app, thing, weights, format.drawn(), view).await;
-    Ok(answer(drawn.map_err(Problem::in_body)?, format, None))
+    let drawn = drawn.map_err(Problem::in_body)?;
+    Ok(answer(drawn, format, picked.as_ref()))
 }
 
 impl PreviewOrder {

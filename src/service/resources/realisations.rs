@@ -16,7 +16,7 @@ use crate::service::http::{
 use crate::service::ids;
 use crate::service::parameters::{ProfileText, WeightQuery, targets};
 use crate::service::shelf::Shelved;
-use crate::service::work::{Asked, Format};
+use crate::service::work::{Asked, Format, WorkError};
 
 /// How accurately a file is written.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -92,19 +92,17 @@ async fn realise(
     let mut profile = asked.of_query()?;
     let mut picked = None;
     if target.is_some() {
+        let asked = (&thing.id, thing.file.to_string(), &weights, format, target);
         let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(&thing), weights.clone());
-        let found = app.bench.run(move || {
-            let (thing, weights) = (&thing.thing, weights.as_ref());
+        let found = app.pick(&asked, move || {
             let asked = Asked::Realise {
-                thing,
-                weights,
+                thing: &thing.thing,
+                weights: weights.as_ref(),
                 format,
             };
-            works.pick(&asked, &target)
+            works.pick(&asked, &target).map_err(WorkError::of_query)
         });
-        let found = found
-            .await?
-            .map_err(crate::service::work::WorkError::of_query)?;
+        let found = found.await?;
         profile = *found.profile();
         picked = Some(found);
     }
@@ -130,7 +128,7 @@ async fn realise(
             .bench
             .run(move || works.realise(&thing.thing, weights.as_ref(), format, &profile))
             .await?;
-        let bytes = made.map_err(crate::service::work::WorkError::of_query)?;
+        let bytes = made.map_err(WorkError::of_query)?;
         counter.increment(1);
         Ok(bytes.into())
     };

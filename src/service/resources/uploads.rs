@@ -216,7 +216,8 @@ async fn pick_for_upload(
     let local = app.blobs.local(upload).await?;
     let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
     let (works, order) = (Arc::clone(&app.works), order.clone());
-    let picked = app.bench.run(move || {
+    let whole = (upload.to_string(), order.clone(), target);
+    let pick = move || {
         let asked = Asked::Ingest {
             upload: local.path(),
             order: &order,
@@ -225,6 +226,6 @@ async fn pick_for_upload(
         works
             .pick(&asked, &target)
             .map_err(|error| error.without(&folder).of_upload())
-    });
-    picked.await?
+    };
+    app.pick(&whole, pick).await
 }

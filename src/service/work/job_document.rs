@@ -3,6 +3,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::TargetDocument;
 use crate::service::http::ProblemDocument;
 use crate::store::{JobKind, JobRecord, JobState};
 
@@ -30,6 +31,9 @@ pub struct JobDocument {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(format = "uri-reference")]
     pub result: Option<String>,
+    /// What was picked for the target of the request that is answered with this.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<TargetDocument>,
     /// Why it failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<ProblemDocument>,
@@ -61,6 +65,7 @@ impl JobDocument {
             .to_owned(),
             seconds_left: None,
             result: done.then(|| format!("{made}{}", job.subject)),
+            target: None,
             problem: job
                 .problem
                 .as_deref()

@@ -12,7 +12,9 @@ use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::measurement::ReadOptions;
 use crate::paint::{Limits, PaintFile};
-use crate::workshop::{self, Environment, IngestOptions, PreviewOptions, Work, WorkshopError};
+use crate::workshop::{
+    self, Environment, IngestOptions, PictureWork, PreviewOptions, Work, WorkshopError,
+};
 
 /// Does the work, within limits.
 #[derive(Clone, Copy, Debug)]
@@ -83,14 +85,14 @@ impl Workshop {
                 view,
                 environment,
                 format,
-            } => then(&Work::Preview {
+            } => then(&Work::Preview(PictureWork {
                 thing,
                 weights,
                 options: &options_of(view, environment),
                 format,
                 limits: &self.limits,
                 written: false,
-            }),
+            })),
         }
     }
 }

@@ -1,14 +1,18 @@
 //! Estimates of a picture.
 
-use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, write_seconds};
+use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, timed, write_seconds};
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::Limits;
 use crate::workshop::previewing::{PictureFormat, PreviewOptions, preview, sampling};
+use crate::workshop::realising::Made;
 use crate::workshop::{Thing, WorkshopError};
 
 /// Pixels on the longer side of the samples; the third is drawn where the second took hardly longer than the first.
 const SIDES: [u32; 3] = [20, 56, 160];
+
+/// The same for who looks through profiles.
+const SEARCHING_SIDES: [u32; 2] = [20, 96];
 
 /// How much longer a larger sample has to take, to tell drawing from getting ready.
 const LONGER: f64 = 3.0;
@@ -19,63 +23,149 @@ const LEAST_SHARE: f64 = 0.25;
 /// Samples per pixel from which on time is proportional to them.
 const ENOUGH: u32 = 8;
 
-/// What drawing a paint, or a blend at the given weights, will take; opening it not included.
+/// A few small pictures: what each took, from which follows what a larger one will, with as many samples or more.
+#[derive(Clone, Debug)]
+pub struct SmallPictures {
+    samples_per_pixel: u32,
+    /// Work, seconds, pixels, bytes of each.
+    drawn: Vec<SmallPicture>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct SmallPicture {
+    work: f64,
+    seconds: f64,
+    pixels: f64,
+    bytes: f64,
+}
+
+/// Samples come in batches: up to one a pixel takes about the same.
+fn batches(samples_per_pixel: u32) -> f64 {
+    f64::from(samples_per_pixel.div_ceil(ENOUGH))
+}
+
+impl SmallPictures {
+    /// Samples per pixel that pictures of so many are told by.
+    fn samples_for(samples_per_pixel: u32) -> u32 {
+        samples_per_pixel.min(2 * ENOUGH)
+    }
+
+    /// Draws them at these numbers of pixels on the longer side; `time` says how often, and which go counts.
+    fn draw(
+        options: &PreviewOptions,
+        samples_per_pixel: u32,
+        sides: &[u32],
+        time: impl Fn(PreviewOptions) -> (f64, Result<Made, WorkshopError>),
+    ) -> Result<Self, WorkshopError> {
+        let longer = f64::from(options.size[0].max(options.size[1]));
+        let mut drawn: Vec<SmallPicture> = Vec::new();
+        for &side in sides {
+            if let [first, .., last] = drawn[..]
+                && last.seconds > LONGER * first.seconds
+            {
+                break;
+            }
+            let scale = (f64::from(side) / longer).min(1.0);
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pixels
+            let size = (options.size).map(|n| ((f64::from(n) * scale).round() as u32).max(1));
+            let (seconds, made) = time(PreviewOptions {
+                size,
+                samples_per_pixel,
+                ..options.clone()
+            });
+            let pixels = f64::from(size[0]) * f64::from(size[1]);
+            drawn.push(SmallPicture {
+                work: pixels * batches(samples_per_pixel),
+                seconds,
+                pixels,
+                bytes: made?.bytes.len() as f64,
+            });
+        }
+        Ok(Self {
+            samples_per_pixel,
+            drawn,
+        })
+    }
+
+    /// Seconds and bytes of a picture of this size.
+    fn tell(&self, size: [u32; 2], samples_per_pixel: u32) -> (f64, f64) {
+        let [.., last] = self.drawn[..] else {
+            return (0.0, 0.0);
+        };
+        let first = self.drawn[0];
+        let pixels = f64::from(size[0]) * f64::from(size[1]);
+        let work = pixels * batches(samples_per_pixel);
+        // Where something else slowed the smaller sample down, the line through both is flat and promises anything: less
+        // than a part of what the larger says by itself is not believed.
+        let least = LEAST_SHARE * last.seconds / last.work * work;
+        let times = [first, last].map(|of| (of.work, of.seconds));
+        let sizes = [first, last].map(|of| (of.pixels, of.bytes));
+        (
+            extrapolated(times[0], times[1], work).max(least),
+            extrapolated(sizes[0], sizes[1], pixels),
+        )
+    }
+}
+
+/// A paint, or a blend at some weights, that is to become a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct PictureWork<'a> {
+    /// The paint or blend.
+    pub thing: &'a Thing,
+    /// Weights of a blend.
+    pub weights: Option<&'a RealisationWeights>,
+    /// What it shows; the profile says how many samples.
+    pub options: &'a PreviewOptions,
+    /// What it is written as.
+    pub format: PictureFormat,
+    /// Limits of pictures.
+    pub limits: &'a Limits,
+    /// Whether it is written to disk.
+    pub written: bool,
+}
+
+/// What drawing a picture will take; opening its paint not included.
+///
+/// `known` keeps the small pictures that tell it from one profile to the next: who looks through profiles draws each once,
+/// so as not to take longer than the picture itself.
 ///
 /// # Errors
 ///
 /// What [`preview`] refuses.
 pub fn estimate_preview(
-    thing: &Thing,
-    weights: Option<&RealisationWeights>,
-    options: &PreviewOptions,
-    format: PictureFormat,
-    limits: &Limits,
+    work: &PictureWork<'_>,
     profile: &Profile,
-    written: bool,
+    known: Option<&mut Option<SmallPictures>>,
 ) -> Result<Estimate, WorkshopError> {
+    let &PictureWork {
+        thing,
+        weights,
+        format,
+        limits,
+        written,
+        ..
+    } = work;
     // Angles have no samples to choose, whatever the profile says.
     let options = &PreviewOptions {
-        samples_per_pixel: if options.show.is_paint() {
-            options.samples_per_pixel
+        samples_per_pixel: if work.options.show.is_paint() {
+            profile.samples_per_pixel
         } else {
             1
         },
-        ..options.clone()
+        ..work.options.clone()
     };
-    let [width, height] = options.size.map(f64::from);
-    let mut samples: Vec<(f64, f64, (f64, f64))> = Vec::new();
-    let batches = |spp: u32| f64::from(spp.div_ceil(ENOUGH));
-    for side in SIDES {
-        if let [(_, first, _), .., (_, last, _)] = samples[..]
-            && last > LONGER * first
-        {
-            break;
+    let few = SmallPictures::samples_for(options.samples_per_pixel);
+    let draw = |of: PreviewOptions| preview(thing, weights, &of, format, limits, &|_| ());
+    let drawn = match known {
+        None => SmallPictures::draw(options, few, &SIDES, |of| shortest(|| draw(of.clone()))),
+        Some(Some(known)) if known.samples_per_pixel == few => Ok(known.clone()),
+        Some(known) => {
+            let sides = &SEARCHING_SIDES;
+            let drawn = SmallPictures::draw(options, few, sides, |of| timed(|| draw(of)))?;
+            Ok(known.insert(drawn).clone())
         }
-        let scale = (f64::from(side) / width.max(height)).min(1.0);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pixels
-        let size = options
-            .size
-            .map(|n| ((f64::from(n) * scale).round() as u32).max(1));
-        let few = PreviewOptions {
-            size,
-            samples_per_pixel: options.samples_per_pixel.min(2 * ENOUGH),
-            ..options.clone()
-        };
-        let (seconds, made) = shortest(|| preview(thing, weights, &few, format, limits, &|_| ()));
-        let pixels = f64::from(size[0]) * f64::from(size[1]);
-        samples.push((
-            pixels * batches(few.samples_per_pixel),
-            seconds,
-            (pixels, made?.bytes.len() as f64),
-        ));
-    }
-    let work = width * height * batches(options.samples_per_pixel);
-    // Where something else slowed the smaller sample down, the line through both is flat and promises anything: less
-    // than a part of what the larger says by itself is not believed.
-    let (first, last) = (samples[0], samples[samples.len() - 1]);
-    let least = LEAST_SHARE * last.1 / last.0 * work;
-    let seconds = extrapolated((first.0, first.1), (last.0, last.1), work).max(least);
-    let bytes = extrapolated(first.2, last.2, width * height);
+    };
+    let (seconds, bytes) = drawn?.tell(options.size, options.samples_per_pixel);
     let error = if options.show.is_paint() {
         sampling(thing, weights, options, limits)?.mean_delta_e
     } else {

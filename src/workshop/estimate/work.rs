@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use super::{
-    Estimate, estimate_blend, estimate_blend_of, estimate_ingest, estimate_preview,
+    Estimate, PictureWork, estimate_blend, estimate_blend_of, estimate_ingest, estimate_preview,
     estimate_realise,
 };
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
-use crate::paint::{Limits, PaintFile};
-use crate::workshop::{Format, IngestOptions, PictureFormat, PreviewOptions, Thing, WorkshopError};
+use crate::paint::PaintFile;
+use crate::workshop::{Format, IngestOptions, Thing, WorkshopError};
 
 /// What is to be done.
 #[derive(Clone, Copy, Debug)]
@@ -45,20 +45,7 @@ pub enum Work<'a> {
         written: bool,
     },
     /// A paint, or a blend at some weights, becomes a picture.
-    Preview {
-        /// The paint or blend.
-        thing: &'a Thing,
-        /// Weights of a blend.
-        weights: Option<&'a RealisationWeights>,
-        /// What it shows; the profile says how many samples.
-        options: &'a PreviewOptions,
-        /// What it is written as.
-        format: PictureFormat,
-        /// Limits of pictures.
-        limits: &'a Limits,
-        /// Whether it is written to disk.
-        written: bool,
-    },
+    Preview(PictureWork<'a>),
 }
 
 impl Work<'_> {
@@ -80,20 +67,7 @@ impl Work<'_> {
                 format,
                 written,
             } => estimate_realise(thing, weights, format, profile, written),
-            Self::Preview {
-                thing,
-                weights,
-                options,
-                format,
-                limits,
-                written,
-            } => {
-                let options = PreviewOptions {
-                    samples_per_pixel: profile.samples_per_pixel,
-                    ..options.clone()
-                };
-                estimate_preview(thing, weights, &options, format, limits, profile, written)
-            }
+            Self::Preview(picture) => estimate_preview(&picture, profile, None),
         }
     }
 }

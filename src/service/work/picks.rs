@@ -1,0 +1,101 @@
+//! What was picked for targets, remembered for a while.
+//!
+//! To pick a profile takes a part of the work itself. Who asks for the same at the same time, or soon after, is answered
+//! with the same pick: a picture that is kept is not estimated again. What is remembered is forgotten after a while, for
+//! it depends on the machine and its load.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use moka::future::Cache;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::works::{Picked, Target};
+use crate::accuracy::Profile;
+use crate::service::app::App;
+use crate::service::http::Problem;
+use crate::service::ids;
+use crate::store::Hash;
+use crate::workshop::EstimatedError;
+
+/// How long a pick holds.
+const HOLDS: Duration = Duration::from_mins(10);
+
+/// Most picks that are remembered.
+const MOST: u64 = 10_000;
+
+/// Picks by what was asked for.
+#[derive(Debug)]
+pub struct Picks(Cache<Hash, Arc<Picked>>);
+
+impl Default for Picks {
+    fn default() -> Self {
+        let cache = Cache::builder().max_capacity(MOST).time_to_live(HOLDS);
+        Self(cache.build())
+    }
+}
+
+/// A target, and what was picked for it.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct TargetDocument {
+    /// What was asked for: `max_error`, `max_seconds` or both.
+    #[schema(value_type = Object)]
+    asked: Target,
+    /// Whether it is met. If not, this is the best that could be done.
+    met: bool,
+    /// Name of the profile that was picked.
+    profile: &'static str,
+    /// Its knobs.
+    #[schema(value_type = Object)]
+    knobs: Profile,
+    /// Seconds that the work was estimated to take here.
+    seconds: f64,
+    /// Seconds that the search took, which count for `max_seconds`.
+    searched: f64,
+    /// Estimated error: `value` and its `unit`, Lab or CIEDE2000.
+    #[schema(value_type = Object)]
+    error: EstimatedError,
+}
+
+impl TargetDocument {
+    /// What is told of a pick.
+    #[must_use]
+    pub fn of(picked: &Picked) -> Self {
+        Self {
+            asked: picked.target,
+            met: picked.met,
+            profile: picked.estimate.profile,
+            knobs: picked.estimate.knobs,
+            seconds: picked.estimate.seconds,
+            searched: picked.searched,
+            error: picked.estimate.error,
+        }
+    }
+}
+
+impl App {
+    /// What is picked for work that `asked` tells from all other work: as it was a while ago, or as `pick` finds it at a
+    /// place to compute.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] of the pick, and when too many wait to compute.
+    pub async fn pick(
+        &self,
+        asked: &impl Serialize,
+        pick: impl FnOnce() -> Result<Picked, Problem> + Send + 'static,
+    ) -> Result<Picked, Problem> {
+        let key = ids::key("pick", asked);
+        let counter = &self.metrics.targets_searched;
+        let search = async {
+            let picked = self.bench.run(pick).await??;
+            counter.increment(1);
+            Ok(Arc::new(picked))
+        };
+        match self.picks.0.try_get_with(key, search).await {
+            Ok(picked) => Ok((*picked).clone()),
+            Err(problem) => Err(Problem::clone(&problem)),
+        }
+    }
+}
