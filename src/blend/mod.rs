@@ -271,6 +271,14 @@ impl Blend {
         self.asked.iter().map(|&place| self.paints[place].origin)
     }
 
+    /// Texel size, grain and lifetime of each paint's flakes, in the order asked for; nothing where no paint has flakes.
+    pub fn textures(&self) -> impl Iterator<Item = &FlakeTexture> {
+        let textures = self.flakes.as_ref().map(|flakes| &flakes.textures);
+        textures
+            .into_iter()
+            .flat_map(|of| self.asked.iter().filter_map(|&place| of.get(place)))
+    }
+
     /// Which paint in the order asked for stands at this place in the order of content hashes.
     #[must_use]
     pub fn asked_at(&self, place: usize) -> Option<usize> {

@@ -1,6 +1,6 @@
 //! `carpaint estimate`: what a command will take, before it is run.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, Subcommand, ValueEnum};
@@ -14,7 +14,7 @@ use super::profile::TargetArgs;
 use super::weights::WeightArgs;
 use crate::workshop::{
     Estimate as Estimated, Format, IngestOptions, PictureFormat, PictureWork, PreviewOptions, Show,
-    Stage, Work, WorkshopError, open, sample_to_estimate,
+    Stage, Work, WorkshopError, open, read_environment, sample_to_estimate,
 };
 
 /// Estimate seconds, bytes and error of a command before running it.
@@ -73,6 +73,9 @@ enum What {
         weights: WeightArgs,
         #[command(flatten)]
         frame: FrameArgs,
+        /// A panorama to light it with, .hdr or .exr, in place of the built-in studio.
+        #[arg(long, value_name = "FILE")]
+        environment: Option<PathBuf>,
         /// Samples per pixel, in place of the profile's.
         #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true)]
         spp: Option<u32>,
@@ -166,11 +169,20 @@ impl Estimate {
                 input,
                 weights,
                 frame,
+                environment,
                 spp,
                 ..
             } => {
-                let (opened, thing) = sample_to_estimate(input, options)?;
+                let (mut opened, thing) = sample_to_estimate(input, options)?;
                 let weights = weights.for_thing(&thing)?;
+                let begun = Instant::now();
+                let read = |path: &PathBuf| read_environment(path, &options.limits);
+                let environment = environment.as_ref().map(read).transpose()?;
+                if environment.is_some() {
+                    let seconds = begun.elapsed().as_secs_f64();
+                    let stage = "environment";
+                    opened.push(Stage { stage, seconds });
+                }
                 let mut profile = options.profile;
                 profile.samples_per_pixel = spp.unwrap_or(profile.samples_per_pixel);
                 let view = PreviewOptions {
@@ -178,7 +190,7 @@ impl Estimate {
                     scene: frame.scene.into(),
                     size: [frame.size.width, frame.size.height],
                     samples_per_pixel: profile.samples_per_pixel,
-                    environment: None,
+                    environment,
                     lights: None,
                 };
                 let work = Work::Preview(PictureWork {

@@ -1,8 +1,8 @@
 //! `carpaint show`: everything known about a paint or a blend.
 
+mod blend_page;
+mod page;
 mod paint_page;
-
-use std::fmt::Write as _;
 
 use clap::Args;
 use serde_json::Value;
@@ -13,6 +13,7 @@ use super::profile::ProfileArgs;
 use super::progress::Progress;
 use crate::paint::{InstrumentError, PaintFile};
 use crate::workshop::{Thing, WorkshopError, describe_blend, describe_paint, open};
+use blend_page::blend_page;
 use paint_page::paint_page;
 
 /// Show a paint or a blend: parameters, residuals beside their floor, energy, grain, lifetime, warnings.
@@ -35,11 +36,7 @@ impl Show {
             (Thing::Paint(paint), true) => return output::print_json(&describe_paint(&paint)),
             (Thing::Blend(blend), true) => return output::print_json(&describe_blend(&blend)),
             (Thing::Paint(paint), false) => paint_page(&paint),
-            (Thing::Blend(blend), false) => {
-                let mut text = String::new();
-                tree(&describe_blend(&blend), 0, &mut text);
-                text
-            }
+            (Thing::Blend(blend), false) => blend_page(&blend),
         };
         output::print(&text)
     }
@@ -82,57 +79,4 @@ pub fn one_line(paint: &PaintFile) -> String {
         ));
     }
     parts.join(" · ")
-}
-
-/// Nested values as an indented list; short lists of numbers stay on one line.
-fn tree(value: &Value, depth: usize, text: &mut String) {
-    let pad = "  ".repeat(depth);
-    let entries: Vec<(String, &Value)> = match value {
-        Value::Object(map) => map.iter().map(|(key, v)| (format!("{key}:"), v)).collect(),
-        Value::Array(list) => list.iter().map(|v| ("-".to_owned(), v)).collect(),
-        other => {
-            let _ = writeln!(text, "{pad}{}", inline(other).unwrap_or_default());
-            return;
-        }
-    };
-    for (key, value) in entries {
-        if let Some(line) = inline(value) {
-            let _ = writeln!(text, "{pad}{key} {line}");
-        } else {
-            let _ = writeln!(text, "{pad}{key}");
-            tree(value, depth + 1, text);
-        }
-    }
-}
-
-fn inline(value: &Value) -> Option<String> {
-    match value {
-        Value::Null => Some("none".to_owned()),
-        Value::Bool(yes) => Some(if *yes { "yes" } else { "no" }.to_owned()),
-        Value::Number(n) => Some(
-            n.as_f64()
-                .filter(|_| !n.is_u64())
-                .map_or_else(|| n.to_string(), |v| format!("{v:.5}")),
-        ),
-        Value::String(text) => Some(text.clone()),
-        Value::Array(list) if list.is_empty() => Some("none".to_owned()),
-        Value::Array(list) if list.iter().all(Value::is_number) => Some(
-            list.iter()
-                .filter_map(inline)
-                .collect::<Vec<_>>()
-                .join(", "),
-        ),
-        Value::Object(map) if map.is_empty() => Some("none".to_owned()),
-        Value::Object(map)
-            if map.len() <= 4 && map.values().all(|v| v.is_number() || v.is_string()) =>
-        {
-            Some(
-                map.iter()
-                    .filter_map(|(k, v)| inline(v).map(|v| format!("{k} {v}")))
-                    .collect::<Vec<_>>()
-                    .join(" · "),
-            )
-        }
-        _ => None,
-    }
 }

@@ -2,7 +2,8 @@
 //!
 //! Occlusion is the cosine-weighted share of the hemisphere over a floor point that the object covers. A ball on the
 //! floor has the closed form `r² h / d³`; other shapes are sampled once on a grid, the same directions at every node,
-//! and read bilinearly.
+//! and read bilinearly. What is narrower than the grid, as the foot of a panel, must not become a row of blots: every
+//! direction starts from another point about its node, with the weight that bilinear reading gives it.
 
 use rayon::prelude::*;
 
@@ -22,28 +23,44 @@ pub(super) enum Ground {
 
 const NODES: u16 = 72;
 const REACH: f32 = 3.2;
+const RAYS: u32 = 256;
 
 impl Ground {
     pub(super) fn new(surface: &Surface) -> Self {
         if matches!(surface, Surface::Sphere) {
             return Self::Ball;
         }
-        let directions: Vec<Vec3> = (0..192)
+        let spacing = 2.0 * REACH / f32::from(NODES - 1);
+        // The triangle of two nodes' reach, by its inverse distribution.
+        let about = |u: f32| {
+            let off = if u < 0.5 {
+                (2.0 * u).sqrt() - 1.0
+            } else {
+                1.0 - (2.0 - 2.0 * u).sqrt()
+            };
+            off * spacing
+        };
+        let rays: Vec<([f32; 2], Vec3)> = (0..RAYS)
             .map(|k| {
-                let [u, v] = Points::of_pixel(0, 0, 192, 0x6d).pair(k, 0);
+                let points = Points::of_pixel(0, 0, RAYS, 0x6d);
+                let ([u, v], start) = (points.pair(k, 0), points.pair(k, 1));
                 let (r, turn) = (u.sqrt(), v * std::f32::consts::TAU);
-                [r * turn.cos(), (1.0 - u).sqrt(), r * turn.sin()]
+                let direction = [r * turn.cos(), (1.0 - u).sqrt(), r * turn.sin()];
+                (start.map(about), direction)
             })
             .collect();
         let place = |k: u16| (f32::from(k) / f32::from(NODES - 1) * 2.0 - 1.0) * REACH;
         let hidden = |z: u16, x: u16| {
-            let from = [place(x), FLOOR_Y, place(z)];
-            let met = directions
+            let (x, z) = (place(x), place(z));
+            let met = rays
                 .iter()
-                .filter(|d| surface.meet(from, **d).is_some())
+                .filter(|([right, near], towards)| {
+                    let from = [x + right, FLOOR_Y, z + near];
+                    surface.meet(from, *towards).is_some()
+                })
                 .count();
             #[allow(clippy::cast_precision_loss)]
-            let share = met as f32 / directions.len() as f32;
+            let share = met as f32 / rays.len() as f32;
             share
         };
         let rows = (0..NODES)

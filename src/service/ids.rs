@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::store::Hash;
 
 /// Counts up when the same request would give other bytes: addresses and kept results of before are not met again.
-pub const MODEL: u32 = 5;
+pub const MODEL: u32 = 6;
 
 /// Hexadecimal digits after the prefix: 128 bits.
 const DIGITS: usize = 32;

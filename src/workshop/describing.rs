@@ -99,7 +99,7 @@ pub fn describe_blend(blend: &Blend) -> Value {
         "flakes": blend.flakes.as_ref().map(|f| json!({
             "theta_h_deg": f.theta_h.degrees(),
             "theta_d_deg": f.theta_d.degrees(),
-            "textures": f.textures,
+            "textures": blend.textures().collect::<Vec<_>>(),
         })),
     })
 }

@@ -2,7 +2,9 @@
 
 use serde_json::Value;
 
-use super::{Format, SAMPLES, Thing, blend_paints, bundle_blend, realise, sample_by_name};
+use super::{
+    Format, SAMPLES, Thing, blend_paints, bundle_blend, describe_blend, realise, sample_by_name,
+};
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::export::assert_documented;
@@ -91,4 +93,21 @@ fn the_gltf_of_every_sample_is_within_five_of_its_paint() {
     sorted.sort_by(f64::total_cmp);
     // No gift: half of the samples are metallics, which one glTF lobe does not meet exactly.
     assert!(sorted[4] <= 3.0 && sorted[7] > 0.5, "{sorted:?}");
+}
+
+#[test]
+fn what_is_told_of_each_paint_of_a_blend_follows_the_order_asked_for() {
+    let profile = Profile::draft();
+    let [ford, bmw] = ["ford_f8", "bmw339"].map(|name| sample(name, &profile));
+    for paints in [[&ford, &bmw], [&bmw, &ford]] {
+        let blend = blend_paints(&paints, &profile, &|_| ())
+            .expect("blends")
+            .blend;
+        let told = describe_blend(&blend);
+        for (k, paint) in paints.into_iter().enumerate() {
+            let texture = paint.paint.flakes.as_ref().expect("flakes").texture;
+            assert_eq!(told["paints"][k]["name"], paint.name);
+            assert_eq!(told["flakes"]["textures"][k]["grain_um"], texture.grain_um);
+        }
+    }
 }

@@ -1,27 +1,9 @@
 //! A paint on a page for people: what `show --json` says, in the order a paint is looked at.
 
-use std::fmt::{Display, Write as _};
-
+use super::page::{Page, range};
 use crate::accuracy::{paint_error, sparkle};
 use crate::paint::{AngleGrid, Flakes, LuminanceError, PaintFile};
 use crate::workshop::readings;
-
-/// Lines of a page: a word on the left, what it is on the right.
-#[derive(Default)]
-struct Page(String);
-
-impl Page {
-    fn line(&mut self, word: &str, text: impl Display) {
-        let _ = writeln!(self.0, "{word:<14} {text}");
-    }
-
-    fn table(&mut self, word: &str, head: &str, rows: impl IntoIterator<Item = String>) {
-        self.line(word, head);
-        for row in rows {
-            self.line("", row);
-        }
-    }
-}
 
 /// The page of a paint.
 pub fn paint_page(file: &PaintFile) -> String {
@@ -115,7 +97,7 @@ pub fn paint_page(file: &PaintFile) -> String {
     for (k, warning) in file.warnings.iter().enumerate() {
         page.line(if k == 0 { "warnings" } else { "" }, warning);
     }
-    page.0
+    page.text()
 }
 
 fn list(values: &[f64]) -> String {
@@ -138,15 +120,6 @@ fn against(file: &PaintFile, aspecular_deg: f64) -> String {
 
 fn of_flakes(page: &mut Page, file: &PaintFile, flakes: &Flakes) {
     let texture = &flakes.texture;
-    let range = |grid: &AngleGrid| {
-        let angles = grid.degrees();
-        format!(
-            "{} of {:.1}..{:.1}°",
-            angles.len(),
-            angles[0],
-            angles[angles.len() - 1]
-        )
-    };
     let lasts = |degrees: f64, widest: f64| {
         if degrees < widest {
             format!("{degrees:.1}°")
@@ -191,12 +164,7 @@ fn of_flakes(page: &mut Page, file: &PaintFile, flakes: &Flakes) {
         "median | 90 % | 99 % | 99.9 % of the texels",
         rows,
     );
-    for term in paint_error(file).terms {
-        let how_far = term
-            .lab
-            .map_or("not known".to_owned(), |lab| format!("{lab:.3} Lab"));
-        page.line("error", format!("{}: {how_far} ({})", term.what, term.how));
-    }
+    page.error(&paint_error(file));
 }
 
 fn of_fit(page: &mut Page, file: &PaintFile) {
