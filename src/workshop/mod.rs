@@ -31,8 +31,8 @@ pub use error::{Fault, WorkshopError, accepted};
 pub use estimate::{Estimate, EstimatedError, PictureWork, Stage, Work, sample_to_estimate};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{
-    BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, check_clusters, ingest,
-    ingest_in_stages, ingest_upload, is_paint_file, open_measurement,
+    BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, ReadingsUpload, check_clusters,
+    ingest, ingest_in_stages, ingest_upload, is_paint_file, open_measurement,
 };
 pub use previewing::{
     Light, MOST_SAMPLES, PictureFormat, PreviewOptions, Show, preview, read_environment, texels,
