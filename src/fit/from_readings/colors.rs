@@ -64,9 +64,9 @@ pub(super) fn fit_colors(reads: &[Read], curve: &Curve) -> FittedColors {
     }
 }
 
-/// A color that no channel of is negative, and its CIEDE2000 to the one given: cut, or made grayer at its luminance,
+/// A color of which no channel is negative, and its CIEDE2000 to the one given: cut, or made grayer at its luminance,
 /// whichever is nearer.
-fn inside_gamut(rgb: LinearRgb) -> (LinearRgb, f64) {
+pub(super) fn inside_gamut(rgb: LinearRgb) -> (LinearRgb, f64) {
     let least = rgb.iter().copied().fold(f64::INFINITY, f64::min);
     let gray = luminance(rgb);
     if least >= 0.0 || gray <= 0.0 {
