@@ -126,6 +126,16 @@ pub fn paint_from_readings(
             colors.rows.len()
         ));
     }
+    let mut angles: Vec<f64> = reads.iter().map(|read| read.aspecular_deg).collect();
+    angles.sort_by(f64::total_cmp);
+    angles.dedup();
+    if angles.len() < reads.len() {
+        warnings.push(format!(
+            "{} readings are of {} angles: where there are several of one, their mean was fitted",
+            reads.len(),
+            angles.len()
+        ));
+    }
     if let Some(most) = reads
         .iter()
         .max_by(|a, b| a.below_zero.total_cmp(&b.below_zero))

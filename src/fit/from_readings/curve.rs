@@ -11,8 +11,9 @@
 //! mirror direction, which nobody saw, it is at most e times as bright as there. ρ grows as the square of 5 % and less,
 //! and linearly beyond, by reweighting.
 //!
-//! Under a coat Schlick's term adds a thousandth at most, and readings cannot tell F0 from the weight. It is fixed: half
-//! reflecting, as metal flakes in a resin are.
+//! Readings cannot tell F0 from a lobe's weight: under a coat Schlick's term adds a thousandth at most. It is fixed at that
+//! of aluminium, of which flakes are made. A smaller one would let the lobes of an uncoated paint grow towards grazing,
+//! where nothing was read, until they give back more light than they get.
 
 use std::f64::consts::PI;
 
@@ -22,7 +23,7 @@ use crate::descent::damped_step;
 use crate::paint::Lobe;
 
 /// Fresnel value of every lobe.
-const F0: f64 = 0.5;
+const F0: f64 = 0.9;
 /// Most lobes.
 const LOBES: usize = 3;
 /// Roughnesses to choose from.

@@ -136,11 +136,12 @@ pub(super) fn read_cxf(
         });
     let collection = resources.child("ObjectCollection").unwrap_or(&none);
     let first = collection.all("Object").next().ok_or(CxfError::NoObject)?;
-    let (mut groups, mut unusable): (Vec<Group>, Vec<String>) = (Vec::new(), Vec::new());
+    let (mut groups, mut unusable): (Vec<Group>, Vec<(&Element, String)>) =
+        (Vec::new(), Vec::new());
     let mut places: BTreeMap<[Option<&str>; 2], usize> = BTreeMap::new();
     for object in collection.all("Object") {
         let (values, reasons) = values_of(object, &specifications);
-        unusable.extend(reasons);
+        unusable.extend(reasons.into_iter().map(|reason| (object, reason)));
         if values.is_empty() {
             continue;
         }
@@ -158,20 +159,23 @@ pub(super) fn read_cxf(
         }
     }
     if groups.is_empty() {
-        let reason = unusable.into_iter().next();
+        let none = || {
+            let reason = "it has no ColorCIELab, ColorCIELCh, ColorCIEXYZ or spectrum";
+            (first, reason.to_owned())
+        };
+        let (object, reason) = unusable.into_iter().next().unwrap_or_else(none);
         return Err(CxfError::NoReading {
-            object: called(first),
-            reason: reason.unwrap_or_else(|| {
-                "it has no ColorCIELab, ColorCIELCh, ColorCIEXYZ or spectrum".to_owned()
-            }),
+            object: called(object),
+            reason,
         });
     }
     let group = one_of(groups, wanted, limits)?;
     let mut warnings = Vec::new();
-    if let Some(reason) = unusable.first() {
+    if let Some((object, reason)) = unusable.first() {
         warnings.push(format!(
-            "{} values are no readings and were not read, the first: {reason}",
-            unusable.len()
+            "{} values are no readings and were not read, the first of {}: {reason}",
+            unusable.len(),
+            called(object)
         ));
     }
     let readings = readings_of(&group, limits, &mut warnings)?;
