@@ -33,6 +33,8 @@ use crate::workshop::{IngestOptions, Source, Work, WorkshopError, find, ingest_i
 ///
 /// Of a CxF3 document with several paints, --name says which. From readings alone a base is fitted that reads the same;
 /// they show neither flakes nor the clear coat: of CSV and CxF3 one of index 1.5 is assumed unless --coat-ior says otherwise.
+// A terminal shows backticks as they are.
+#[allow(clippy::doc_markdown)]
 #[derive(Args, Clone, Debug)]
 #[command(verbatim_doc_comment)]
 pub struct Ingest {
@@ -55,6 +57,7 @@ pub struct Ingest {
 }
 
 /// How a measurement is read.
+#[allow(clippy::doc_markdown)]
 #[derive(Args, Clone, Debug, Default)]
 pub struct ReadingArgs {
     /// What the file is, where it should not be recognised from its contents.

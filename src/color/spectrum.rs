@@ -216,7 +216,7 @@ mod tests {
     use crate::color::{Lab, ciede2000};
 
     fn every(step: usize) -> Vec<f64> {
-        (400..=700).step_by(step).map(|nm| nm as f64).collect()
+        (400..=700_u16).step_by(step).map(f64::from).collect()
     }
 
     #[test]
@@ -239,7 +239,7 @@ mod tests {
         }
     }
 
-    /// Two patches of a color checker (BabelColor's averages), 400 to 700 nm. Lab was computed by colour-science 0.4.7's
+    /// Two patches of a color checker (averages of many), 400 to 700 nm. Lab was computed by colour-science 0.4.7's
     /// tables: Sprague interpolation to 1 nm, sums at 1 nm from 360 to 780 nm, white of D65 and the 2° observer.
     #[test]
     fn spectra_have_the_color_that_sums_at_one_nanometre_give() {

@@ -1,4 +1,4 @@
-//! Readings as a CxF3 document (ISO 17972-1): what measuring and recipe software exchanges.
+//! Readings as a `CxF3` document (ISO 17972-1): what measuring and recipe software exchanges.
 //!
 //! One object holds an L, a, b for each angle, each with a specification of its own that names light, observer and
 //! geometry (`MultiAngle`, one `BRDFAngle`). The same paint, name and angles give the same bytes: the format wants a date
@@ -9,14 +9,14 @@ use std::fmt::Write as _;
 
 use super::readings::Readings;
 
-/// Media type of the document: CxF3 has none of its own.
+/// Media type of the document: `CxF3` has none of its own.
 pub const CXF_MEDIA_TYPE: &str = "application/xml";
 
 /// Day of a paint that does not know when it was measured.
 const UNKNOWN_DAY: &str = "1970-01-01";
 
 impl Readings {
-    /// The readings as a CxF3 document of a paint of this name, measured on this day.
+    /// The readings as a `CxF3` document of a paint of this name, measured on this day.
     #[must_use]
     pub fn to_cxf(&self, name: &str, measured_on: Option<&str>) -> String {
         let date = format!(

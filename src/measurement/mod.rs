@@ -71,7 +71,7 @@ pub enum Layout {
     Package,
     /// Readings of a multi-angle instrument as a table of text: `aspecular_deg,L,a,b`.
     Csv,
-    /// Readings of a multi-angle instrument in CxF3 (ISO 17972-1).
+    /// Readings of a multi-angle instrument in `CxF3` (ISO 17972-1).
     Cxf,
 }
 

@@ -1,4 +1,4 @@
-//! Readings of a multi-angle instrument that come as a file of their own: a CSV, or CxF3.
+//! Readings of a multi-angle instrument that come as a file of their own: a CSV, or `CxF3`.
 //!
 //! Both are text. What a file does not say is assumed and told in a warning, and so is what was not read; nothing is
 //! guessed in silence.

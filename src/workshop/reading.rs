@@ -28,7 +28,7 @@ pub fn readings(
     export::readings(&paint.paint, angles).map_err(|error| WorkshopError::usage("angles", error))
 }
 
-/// The same as a CxF3 document, dated as the measurement that the paint was made of.
+/// The same as a `CxF3` document, dated as the measurement that the paint was made of.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! Readings in CxF3, the color exchange format (ISO 17972-1).
+//! Readings in `CxF3`, the color exchange format (ISO 17972-1).
 //!
 //! A reading is a `ColorCIELab`, `ColorCIELCh`, `ColorCIEXYZ`, `ReflectanceSpectrum` or `CustomSpectrum` whose
 //! `ColorSpecification` has the geometry `MultiAngle`: one `BRDFAngle` for each specification, or several of which the

@@ -349,6 +349,18 @@ fn spectra_win_over_colors_of_the_same_angle() {
         (32, "nm700")
     );
     assert!(file.warnings.is_empty(), "{:?}", file.warnings);
+    let short = spectrum.replace(&"0.25 ".repeat(10), "");
+    let text = document(
+        &object("o1", "silver", &(lab("s15", 90.0) + &short)),
+        &at("s15", "15"),
+    );
+    let file = read_as(Layout::Cxf, &text).expect("a paint");
+    assert_eq!(file.readings.rows, [[15.0, 90.0, 1.0, -2.0]]);
+    assert!(
+        file.warnings[0].contains("the spectrum goes from 400"),
+        "{:?}",
+        file.warnings
+    );
     let xyz = r#"<ColorCIEXYZ ColorSpecification="s15"><X>94.811</X><Y>100</Y><Z>107.304</Z></ColorCIEXYZ>"#;
     let file = read_as(
         Layout::Cxf,

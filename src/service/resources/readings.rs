@@ -80,7 +80,7 @@ pub async fn table(
     read(&app, &id, instrument, answer).await
 }
 
-/// Readings of a paint as a CxF3 document (ISO 17972-1), which measuring and recipe software reads.
+/// Readings of a paint as a `CxF3` document (ISO 17972-1), which measuring and recipe software reads.
 ///
 /// One object with an L, a, b for each angle, each of a specification with the geometry `MultiAngle`. Its dates are the
 /// day of the measurement where the paint knows it (`measured_on`), and 1970-01-01 where it does not.

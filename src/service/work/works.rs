@@ -211,7 +211,7 @@ pub trait Works: Debug + Send + Sync {
     fn readings(&self, paint: &Thing, aspecular_deg: Option<&[f64]>)
     -> Result<Readings, WorkError>;
 
-    /// The same as a CxF3 document.
+    /// The same as a `CxF3` document.
     ///
     /// # Errors
     ///

@@ -61,13 +61,7 @@ pub(super) fn ingest_package(
 ) -> Result<PaintFile, String> {
     let mut warnings = package.warnings.clone();
     let mut residuals = None;
-    let coat = match (package.coat, options.coat_ior) {
-        (coat, None) => coat,
-        (coat, Some(ior)) => Some(Coat {
-            ior,
-            ..coat.unwrap_or(Coat::smooth(ior))
-        }),
-    };
+    let coat = coat_of(&package, options);
     // Share of the time that goes into the base: nothing where the lab fitted it, everything where there are no flakes.
     let based = match (&package.base, &package.flakes) {
         (Some(PackageBase::Table { .. }), Some(_)) => 0.4,
@@ -163,6 +157,17 @@ pub(super) fn ingest_package(
         readings: against,
         ..file
     })
+}
+
+/// The coat of a package, of the index that the caller says where he says one.
+fn coat_of(package: &Package, options: &IngestOptions) -> Option<Coat> {
+    match (package.coat, options.coat_ior) {
+        (coat, None) => coat,
+        (coat, Some(ior)) => Some(Coat {
+            ior,
+            ..coat.unwrap_or(Coat::smooth(ior))
+        }),
+    }
 }
 
 /// Fits the table of a package inside its coat.

@@ -12,9 +12,9 @@ use quick_xml::reader::NsReader;
 use super::CxfError;
 use crate::measurement::readings::told;
 
-/// Namespace of CxF3.
+/// Namespace of `CxF3`.
 pub(super) const NAMESPACE: &str = "http://colorexchangeformat.com/CxF3-core";
-/// Elements inside each other; CxF3 itself nests ten.
+/// Elements inside each other; `CxF3` itself nests ten.
 const DEPTH: usize = 64;
 /// Elements of a document, and bytes of one tag.
 const ELEMENTS: usize = 200_000;
@@ -58,7 +58,7 @@ impl Element {
     }
 }
 
-/// Reads a document to its end; its root is CxF3's.
+/// Reads a document to its end; its root is `CxF3`'s.
 pub(super) fn read_document(text: &str) -> Result<Element, CxfError> {
     let mut reader = NsReader::from_str(text);
     // Elements that are begun and not ended, the root first; of those not in the namespace only how many.

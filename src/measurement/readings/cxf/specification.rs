@@ -1,4 +1,4 @@
-//! What a `ColorSpecification` of CxF3 says: light, observer, geometry, wavelengths, instrument.
+//! What a `ColorSpecification` of `CxF3` says: light, observer, geometry, wavelengths, instrument.
 
 use super::document::Element;
 use crate::color::{Illuminant, Observer};

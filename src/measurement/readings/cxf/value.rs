@@ -1,9 +1,9 @@
-//! The colors of an object of CxF3 that are readings of a paint at an angle.
+//! The colors of an object of `CxF3` that are readings of a paint at an angle.
 
 use super::Specifications;
 use super::document::Element;
 use super::specification::{Angles, Specification};
-use crate::color::{Illuminant, Lab, Observer, WhitePoint};
+use crate::color::{Illuminant, Lab, Observer, Wavelengths, WhitePoint};
 use crate::measurement::readings::told;
 
 /// Most values of one spectrum.
@@ -142,10 +142,10 @@ fn spectrum(entry: &Element, of: &Specification) -> Result<(Kind, Vec<f64>), Str
     if factors.len() > MOST_BANDS {
         return Err(format!("it has more than {MOST_BANDS} values"));
     }
-    let nm = (0..factors.len())
+    let nm: Vec<f64> = (0..factors.len())
         .map(|k| start + step * k as f64)
         .collect();
-    Ok((Kind::Spectrum(nm), factors))
+    spectral(nm, factors)
 }
 
 fn points(entry: &Element) -> Result<(Kind, Vec<f64>), String> {
@@ -159,5 +159,11 @@ fn points(entry: &Element) -> Result<(Kind, Vec<f64>), String> {
     }
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (nm, factors) = points.into_iter().unzip();
+    spectral(nm, factors)
+}
+
+/// A spectrum whose wavelengths have a color; of one that has none another value of the angle may do.
+fn spectral(nm: Vec<f64>, factors: Vec<f64>) -> Result<(Kind, Vec<f64>), String> {
+    Wavelengths::new(&nm).map_err(|e| e.to_string())?;
     Ok((Kind::Spectrum(nm), factors))
 }
