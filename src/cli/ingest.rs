@@ -16,14 +16,32 @@ use crate::workshop::{IngestOptions, Source, Work, WorkshopError, find, ingest_i
 
 /// Fit a measurement and keep it as a .paint.
 ///
-/// INPUT is a measured-paint package (a .zip or a folder), an RGL .bsdf, an MPI 2005 table or a MERL binary. What it is
-/// is recognised from its contents; --layout overrides that.
+/// INPUT is a measured-paint package (a .zip or a folder), an RGL .bsdf, an MPI 2005 table, a MERL binary, or readings of a
+/// hand-held multi-angle instrument as CSV or CxF3. What it is is recognised from its contents; --layout overrides that.
+///
+/// A CSV of readings has a line for each angle: aspecular_deg first, degrees from the mirror direction towards the light,
+/// then L, a, b or a spectrum nm400 to nm700 (1 is white). Lines above the columns say what a table cannot:
+///
+///     # name: my silver
+///     # illuminant: D65
+///     # observer: 10
+///     # illumination_deg: 45
+///     aspecular_deg,L,a,b
+///     15,95.2,-0.6,0.9
+///     45,48.7,-0.9,-1.2
+///     110,24.1,-0.3,-1.8
+///
+/// Of a CxF3 document with several paints, --name says which. From readings alone a base is fitted that reads the same;
+/// they show neither flakes nor the clear coat: of CSV and CxF3 one of index 1.5 is assumed unless --coat-ior says otherwise.
+// A terminal shows backticks as they are.
+#[allow(clippy::doc_markdown)]
 #[derive(Args, Clone, Debug)]
+#[command(verbatim_doc_comment)]
 pub struct Ingest {
     /// The measurement.
     #[arg(value_name = "INPUT")]
     input: String,
-    /// Name of the paint, in place of the measurement's own.
+    /// Name of the paint, in place of the measurement's own; which of a CxF3 document's paints, by its name or Id.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     name: Option<String>,
     #[command(flatten)]
@@ -39,6 +57,7 @@ pub struct Ingest {
 }
 
 /// How a measurement is read.
+#[allow(clippy::doc_markdown)]
 #[derive(Args, Clone, Debug, Default)]
 pub struct ReadingArgs {
     /// What the file is, where it should not be recognised from its contents.
@@ -51,7 +70,8 @@ pub struct ReadingArgs {
     #[arg(long, value_name = "N", value_parser = whole(0..=1_u64 << 20),
         allow_hyphen_values = true)]
     header_bytes: Option<u64>,
-    /// Give the paint a clear coat of this index of refraction, 1 to 4; otherwise the fit decides.
+    /// Give the paint a clear coat of this index of refraction, 1 to 4; otherwise the fit decides, and of readings as CSV or
+    /// CxF3, which 1 leaves uncoated, it is 1.5.
     #[arg(long, value_name = "N", value_parser = real(1.0..=4.0), allow_hyphen_values = true)]
     coat_ior: Option<f64>,
 }
@@ -63,6 +83,8 @@ enum LayoutName {
     Merl,
     Rgl,
     Package,
+    Csv,
+    Cxf,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -83,6 +105,8 @@ impl ReadingArgs {
             LayoutName::Merl => Layout::Merl,
             LayoutName::Rgl => Layout::Rgl,
             LayoutName::Package => Layout::Package,
+            LayoutName::Csv => Layout::Csv,
+            LayoutName::Cxf => Layout::Cxf,
         });
         let theta_h = self.theta_h.map(|spacing| match spacing {
             SpacingName::Linear => ThetaHSpacing::Linear,

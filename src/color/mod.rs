@@ -4,12 +4,14 @@
 //! perfect diffuser under that same white. A Lab value that came from elsewhere travels with its illuminant and
 //! observer as a [`ReadingLab`]. Arithmetic is `f64`.
 //!
-//! Left to others: tone mapping for a screen (`render`). Spectra are turned into colors nowhere yet.
+//! Left to others: tone mapping for a screen (`render`). Spectra come in as reflectance factors ([`Wavelengths`]) and are
+//! colors from then on.
 
 mod adaptation;
 mod difference;
 mod lab;
 mod rgb;
+mod spectrum;
 mod transfer;
 mod white;
 
@@ -18,5 +20,6 @@ pub use difference::ciede2000;
 pub(crate) use lab::{KNEE, expand, expand_f32};
 pub use lab::{Lab, ReadingLab};
 pub use rgb::{LinearRgb, luminance, rgb_to_xyz, xyz_to_rgb};
+pub use spectrum::{SpectrumError, Wavelengths};
 pub use transfer::{decode_srgb, encode_srgb, encode_srgb_f32};
 pub use white::{D65_2, Illuminant, Observer, WhitePoint};

@@ -17,9 +17,9 @@ const ILLUMINATION_DEG: f64 = 45.0;
 /// Readings of one paint, a row for each angle in the order asked for.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Readings {
-    illumination_deg: f64,
-    illuminant: &'static str,
-    observer: &'static str,
+    pub(super) illumination_deg: f64,
+    pub(super) illuminant: &'static str,
+    pub(super) observer: &'static str,
     columns: [&'static str; 4],
     /// Aspecular angle in degrees, L, a, b.
     pub rows: Vec<[f64; 4]>,

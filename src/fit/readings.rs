@@ -2,39 +2,33 @@
 
 use std::f64::consts::PI;
 
-use crate::color::{D65_2, Lab, Observer, WhitePoint, adapted, ciede2000, rgb_to_xyz};
+use super::from_readings::directions;
+use crate::color::{D65_2, Lab, adapted, ciede2000, rgb_to_xyz};
 use crate::measurement::MultiAngle;
 use crate::paint::{CarPaint, Chi, ReadingError, ReadingResiduals, Reflectance};
 
-/// Compares a paint, flakes at their mean and the coat's mirror image left out, with L, a, b readings.
+/// Compares a paint, flakes at their mean and the coat's mirror image left out, with readings.
 ///
-/// `None` where the readings hold no L, a, b, or none whose viewer is above the paint. Compared is under the readings'
-/// own light, to which the paint's color is adapted; readings of another observer than the 2° keep their numbers, which
-/// is marked as approximate: to convert them takes spectra. Model description, section 8.
+/// `None` where the readings hold no colors, or none whose viewer is above the paint. Compared is under the readings'
+/// own light, to which the paint's color is adapted, and of spectra under D65; L, a, b of another observer than the 2°
+/// keep their numbers, which is marked as approximate: to convert them takes spectra. Model description, section 8.
 #[must_use]
 pub fn against_readings(paint: &CarPaint, readings: &MultiAngle) -> Option<ReadingResiduals> {
-    let column = |name: &str| readings.columns.iter().position(|own| own == name);
-    let [l, a, b] = [column("L")?, column("a")?, column("b")?];
+    let colors = readings.colors().ok()?;
     let reflectance = Reflectance::new(paint);
-    let white = WhitePoint::of(readings.illuminant, Observer::Two);
-    let light = readings.illumination_deg.to_radians();
-    let wi = [-light.sin(), 0.0, light.cos()];
-    let rows: Vec<ReadingError> = readings
+    let rows: Vec<ReadingError> = colors
         .rows
         .iter()
-        .filter_map(|row| {
-            let aspecular_deg = *row.first()?;
-            let view = (readings.illumination_deg - aspecular_deg).to_radians();
-            let wo = [view.sin(), 0.0, view.cos()];
+        .filter_map(|&(aspecular_deg, read)| {
+            let (wi, wo) = directions(readings.illumination_deg, aspecular_deg);
             if wo[2] <= 0.0 || wi[2] <= 0.0 {
                 return None;
             }
-            let read = Lab::from([*row.get(l)?, *row.get(a)?, *row.get(b)?]);
             let factor = reflectance.evaluate(wi, wo, Chi::Table).map(|f| f * PI);
-            let own = Lab::from_xyz(adapted(rgb_to_xyz(factor), D65_2, white), white);
+            let xyz = adapted(rgb_to_xyz(factor), D65_2, colors.white);
             Some(ReadingError {
                 aspecular_deg,
-                delta_e_2000: ciede2000(own, read),
+                delta_e_2000: ciede2000(Lab::from_xyz(xyz, colors.white), read),
             })
         })
         .collect();
@@ -52,14 +46,14 @@ pub fn against_readings(paint: &CarPaint, readings: &MultiAngle) -> Option<Readi
         rows,
         median,
         worst,
-        approximate: readings.observer != Observer::Two,
+        approximate: colors.approximate,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::Illuminant;
+    use crate::color::{Illuminant, Observer, WhitePoint};
     use crate::paint::{ASPECULAR_DEG, ColorTable, instrument_pairs};
 
     fn gray(diffuse: f64) -> CarPaint {

@@ -13,11 +13,11 @@ pub use self::base::TableLayout;
 use self::base::base;
 pub(super) use self::base::{BaseEntry, TableEntry};
 use self::field::Field;
-pub use self::readings::MultiAngle;
 use self::readings::multi_angle;
 pub(super) use self::slices::FlakesEntry;
 use self::slices::flakes;
 use self::unique::Unique;
+use super::multi_angle::MultiAngle;
 use super::package::PackageError;
 use crate::paint::{Coat, Limits};
 

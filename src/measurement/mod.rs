@@ -6,25 +6,29 @@
 //! `None`.
 //!
 //! Bare `.bsdf`, MPI and MERL files are measured in air and include everything the sample did to light, the clear
-//! coat's highlight as well. Left to others: turning a measurement into a paint (`fit`).
+//! coat's highlight as well. Readings of a hand-held multi-angle instrument come in a package or as a file of their own
+//! ([`ReadingsFile`]); they leave the highlight out. Left to others: turning a measurement into a paint (`fit`).
 
 mod archive;
 mod manifest;
 mod merl;
 mod mpi;
+mod multi_angle;
 mod package;
 mod picture;
+mod readings;
 mod rgl;
 mod table;
 mod tensor;
 
 pub use merl::read_merl;
 pub use mpi::{MPI_HEADER_BYTES, read_mpi};
+pub use multi_angle::{MultiAngle, ReadColors, ReadColorsError};
 pub use package::{
-    FlakePictures, FlakeSlices, MultiAngle, Package, PackageBase, PackageError, SliceRoom,
-    TableLayout,
+    FlakePictures, FlakeSlices, Package, PackageBase, PackageError, SliceRoom, TableLayout,
 };
 pub use picture::{Picture, PictureError, PictureScratch};
+pub use readings::{CsvError, CxfError, ReadingsError, ReadingsFile};
 pub use rgl::{RglError, RglMeasurement};
 pub(crate) use table::half_frame_pair;
 pub use table::{HalfAngleTable, TableError, ThetaHSpacing};
@@ -50,7 +54,7 @@ pub trait MeasuredBrdf: Sync {
 }
 
 /// Names of all layouts.
-const LAYOUTS: &str = "rgl, mpi-2005, merl or package";
+const LAYOUTS: &str = "rgl, mpi-2005, merl, package, csv or cxf";
 
 /// How the bytes of a measurement are laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -65,6 +69,10 @@ pub enum Layout {
     Merl,
     /// Measured-paint package, a zip archive.
     Package,
+    /// Readings of a multi-angle instrument as a table of text: `aspecular_deg,L,a,b`.
+    Csv,
+    /// Readings of a multi-angle instrument in `CxF3` (ISO 17972-1).
+    Cxf,
 }
 
 impl Layout {
@@ -76,15 +84,30 @@ impl Layout {
             Self::Mpi2005 => "mpi-2005",
             Self::Merl => "merl",
             Self::Package => "package",
+            Self::Csv => "csv",
+            Self::Cxf => "cxf",
         }
     }
 
     /// The layout of this name.
     #[must_use]
     pub fn by_name(name: &str) -> Option<Self> {
-        [Self::Rgl, Self::Mpi2005, Self::Merl, Self::Package]
-            .into_iter()
-            .find(|layout| layout.name() == name)
+        [
+            Self::Rgl,
+            Self::Mpi2005,
+            Self::Merl,
+            Self::Package,
+            Self::Csv,
+            Self::Cxf,
+        ]
+        .into_iter()
+        .find(|layout| layout.name() == name)
+    }
+
+    /// Whether it holds readings at a few angles, and not a reflectance.
+    #[must_use]
+    pub const fn is_of_readings(self) -> bool {
+        matches!(self, Self::Csv | Self::Cxf)
     }
 }
 
@@ -115,7 +138,7 @@ pub enum MeasurementError {
     /// Neither the first bytes nor the length belong to a known layout.
     #[error(
         "the measurement, {bytes} bytes, {what}; that is no tensor file, package, MPI 2005 table (17496000 bytes and a \
-         header of 84) or MERL table (34992012 bytes); where bytes do not tell, --layout or layout in a query does, \
+         header of 84), MERL table (34992012 bytes), CSV of readings (whose columns begin with aspecular_deg) or CxF3; where bytes do not tell, --layout or layout in a query does, \
          accepted are {LAYOUTS}"
     )]
     Unknown {
@@ -143,6 +166,9 @@ pub enum MeasurementError {
     /// A package where a bare BRDF was wanted.
     #[error("this is a measured-paint package, not a bare BRDF")]
     Package,
+    /// Readings where a bare BRDF was wanted.
+    #[error("these are readings of an instrument at a few angles, not a bare BRDF")]
+    Readings,
     /// A damaged tensor file, or one of something else.
     #[error("tensor file: {0}")]
     Rgl(#[from] RglError),
@@ -162,7 +188,7 @@ pub fn sniff(bytes: &[u8], options: &ReadOptions) -> Result<Layout, MeasurementE
     } else if bytes.starts_with(b"PK") {
         Some(Layout::Package)
     } else {
-        None
+        readings::begins_as(bytes)
     };
     match (options.layout, begins_as) {
         (Some(stated), Some(found)) if stated != found => {
@@ -203,6 +229,9 @@ fn what_it_is(bytes: &[u8]) -> String {
     match known.iter().find(|(magic, _)| bytes.starts_with(magic)) {
         Some((_, what)) => (*what).to_owned(),
         None if bytes.is_empty() => "is empty".to_owned(),
+        None if readings::is_utf16(bytes) => {
+            "is text in UTF-16; readings are read in UTF-8, as which a spreadsheet or an editor saves them".to_owned()
+        }
         None if bytes.trim_ascii_start().starts_with(b"{") => {
             "is JSON; a package's paint.json comes zipped together with its pictures".to_owned()
         }
@@ -248,6 +277,7 @@ impl BrdfMeasurement {
                 options.theta_h.unwrap_or(ThetaHSpacing::SquareRoot),
             )?),
             Layout::Package => return Err(MeasurementError::Package),
+            Layout::Csv | Layout::Cxf => return Err(MeasurementError::Readings),
         })
     }
 

@@ -17,8 +17,9 @@ use self::color_table::color_table_of;
 pub use self::error::PackageError;
 pub use self::slices::{FlakePictures, FlakeSlices, SliceRoom};
 use super::archive::{Archive, Unpacking};
+pub use super::manifest::TableLayout;
 use super::manifest::{BaseEntry, MANIFEST, Manifest};
-pub use super::manifest::{MultiAngle, TableLayout};
+use super::multi_angle::MultiAngle;
 use crate::color::LinearRgb;
 use crate::paint::{Coat, ColorTable, Limits, Lobe};
 

@@ -21,7 +21,7 @@ pub const NAME_CHARACTERS: usize = 200;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
-    /// Kind of source: `package`, `rgl`, `mpi-2005`, `merl`, `sample`, `blend`.
+    /// Kind of source: `package`, `rgl`, `mpi-2005`, `merl`, `csv`, `cxf`, `sample`, `blend`.
     pub source: String,
     /// BLAKE3 of the source's bytes, hexadecimal; of a blend, the hashes of its paints.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -104,6 +104,7 @@ fn resources() -> Router<App> {
         .route("/v1/paints/{id}/preview.{format}", get(previews::of_paint))
         .route("/v1/paints/{id}/readings", get(readings::show))
         .route("/v1/paints/{id}/readings.csv", get(readings::table))
+        .route("/v1/paints/{id}/readings.cxf", get(readings::document))
         .route("/v1/blends", axum::routing::post(blends::create))
         .route("/v1/previews", axum::routing::post(previews::create))
         .route("/v1/blends/{id}", get(blends::show))

@@ -92,12 +92,16 @@ fn mirror_of(coat: Option<Coat>, pairs: &Pairs) -> Option<Vec<f64>> {
     Some(pairs.pairs.iter().map(weight).collect())
 }
 
+/// Said of a measurement whose base nobody measured.
+const NOTHING_BUT_READINGS: &str = "nothing but readings at a few angles was measured, which says nothing of other \
+                                    directions; without --raw the paint that was fitted to them is evaluated";
+
 /// Evaluates a measurement as it is: negative values kept, `None` where it holds nothing. Of a package, the base plus the
 /// mean of the texels, both through the coat.
 ///
 /// # Errors
 ///
-/// [`WorkshopError`] for a package whose table or pictures are damaged.
+/// [`WorkshopError`] for a package whose table or pictures are damaged, and where nothing but readings was measured.
 pub fn evaluate_raw(measurement: &Measurement, pairs: &Pairs) -> Result<Values, WorkshopError> {
     match measurement {
         Measurement::Brdf(bare) => Ok(Values {
@@ -108,6 +112,10 @@ pub fn evaluate_raw(measurement: &Measurement, pairs: &Pairs) -> Result<Values, 
                 .collect(),
             mirror: None,
         }),
+        Measurement::Readings(upload) => Err(WorkshopError::input(
+            upload.layout.name(),
+            NOTHING_BUT_READINGS,
+        )),
         Measurement::Package(package) => Ok(Values {
             f: raw_package(package, pairs)?,
             mirror: mirror_of(package.coat, pairs),
@@ -135,9 +143,7 @@ fn raw_package(package: &Package, pairs: &Pairs) -> Result<Vec<Option<[f64; 3]>>
     };
     let above = |w: Direction| w[2] > 0.0;
     match &package.base {
-        None => Err(wrong(
-            &"base: there is neither a model nor a brdf_table to evaluate",
-        )),
+        None => Err(wrong(&NOTHING_BUT_READINGS)),
         Some(PackageBase::Model {
             diffuse,
             lobes,

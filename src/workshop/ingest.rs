@@ -2,12 +2,14 @@
 
 mod fitting;
 mod measurement;
+mod readings;
 
 use std::path::Path;
 
 pub(super) use self::fitting::{finish, fitted_base, table_of};
 use self::fitting::{ingest_brdf, ingest_package};
-pub use self::measurement::{BareMeasurement, Measurement, open_measurement};
+pub use self::measurement::{BareMeasurement, Measurement, ReadingsUpload, open_measurement};
+use self::readings::ingest_readings;
 use super::content::content_hash;
 use super::thing::first_bytes;
 use super::{WorkshopError, read};
@@ -97,7 +99,7 @@ pub fn ingest(
 }
 
 /// The same, telling `ended` the name of each stage when it is over: `open`, `hash`, `base`, `flakes`, `error` (what the
-/// clusters miss of the pictures), `certificate`. Stages that a measurement does not need are not told.
+/// clusters miss of the pictures), `certificate`; `base` after `flakes` where it is fitted to readings. Stages that a measurement does not need are not told.
 ///
 /// # Errors
 ///
@@ -114,11 +116,11 @@ pub fn ingest_in_stages(
     ingest_called(path, options, |_| stem, progress, ended)
 }
 
-/// Fits a measurement that has no name of its own as what `unnamed` calls it.
+/// Fits a measurement that has no name of its own as what `unnamed` calls it, who hears how it describes itself.
 fn ingest_called(
     path: &Path,
     options: &IngestOptions,
-    unnamed: impl FnOnce(&BareMeasurement) -> String,
+    unnamed: impl FnOnce(Option<&str>) -> String,
     progress: &(dyn Fn(f32) + Sync),
     ended: &dyn Fn(&'static str),
 ) -> Result<PaintFile, WorkshopError> {
@@ -138,8 +140,14 @@ fn ingest_called(
     let file = match opened {
         Measurement::Brdf(bare) => {
             let named = options.name.clone();
-            let name = named.unwrap_or_else(|| as_name(&unnamed(&bare), bare.layout));
+            let called = || as_name(&unnamed(bare.brdf.description()), bare.layout);
+            let name = named.unwrap_or_else(called);
             ingest_brdf(&bare, name, options, progress, ended)
+        }
+        Measurement::Readings(upload) => {
+            let named = options.name.clone().or_else(|| upload.file.name.clone());
+            let name = named.unwrap_or_else(|| as_name(&unnamed(None), upload.layout));
+            ingest_readings(*upload, name, options, ended)
         }
         Measurement::Package(package) => {
             let hash = content_hash(path, &options.limits)?;
@@ -182,8 +190,7 @@ pub fn ingest_upload(
     };
     if !is_paint_file(path)? {
         // The file is called by the hash of its bytes, which is no name: better what it says about itself.
-        let description =
-            |bare: &BareMeasurement| bare.brdf.description().unwrap_or_default().to_owned();
+        let description = |said: Option<&str>| said.unwrap_or_default().to_owned();
         return ingest_called(path, options, description, progress, &|_| ()).map_err(named);
     }
     options.check_measured()?;

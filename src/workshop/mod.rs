@@ -22,7 +22,7 @@ mod study;
 mod target;
 mod thing;
 
-pub use crate::export::{Gloss, Readings};
+pub use crate::export::{CXF_MEDIA_TYPE, Gloss, Readings};
 pub use crate::render::{Environment, EnvironmentError, EnvironmentFile, EnvironmentFormat, Shape};
 pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;
@@ -31,13 +31,13 @@ pub use error::{Fault, WorkshopError, accepted};
 pub use estimate::{Estimate, EstimatedError, PictureWork, Stage, Work, sample_to_estimate};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{
-    BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, check_clusters, ingest,
-    ingest_in_stages, ingest_upload, is_paint_file, open_measurement,
+    BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, ReadingsUpload, check_clusters,
+    ingest, ingest_in_stages, ingest_upload, is_paint_file, open_measurement,
 };
 pub use previewing::{
     Light, MOST_SAMPLES, PictureFormat, PreviewOptions, Show, preview, read_environment, texels,
 };
-pub use reading::{MOST_ANGLES, color_difference, gloss, readings};
+pub use reading::{MOST_ANGLES, color_difference, gloss, readings, readings_document};
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
 pub use selftest::{Check, selftest};

@@ -28,6 +28,20 @@ pub fn readings(
     export::readings(&paint.paint, angles).map_err(|error| WorkshopError::usage("angles", error))
 }
 
+/// The same as a `CxF3` document, dated as the measurement that the paint was made of.
+///
+/// # Errors
+///
+/// As [`readings`].
+pub fn readings_document(
+    paint: &PaintFile,
+    aspecular_deg: Option<&[f64]>,
+) -> Result<String, WorkshopError> {
+    let measured_on = paint.provenance.notes.get("measured_on");
+    let read = readings(paint, aspecular_deg)?;
+    Ok(read.to_cxf(&paint.name, measured_on.map(String::as_str)))
+}
+
 /// What a glossmeter reads of a paint.
 #[must_use]
 pub fn gloss(paint: &PaintFile) -> Gloss {

@@ -47,7 +47,11 @@ fn a_silly_value_is_refused_with_its_argument_and_what_is_accepted() {
         (&ingest, "--coat-ior", "1 to 4"),
         (&["samples", "list"], "--threads", "1 to 1024"),
         (&["serve"], "--listen", "an IP address and a port"),
-        (&ingest, "--layout", "mpi-2005, merl, rgl, package"),
+        (
+            &ingest,
+            "--layout",
+            "mpi-2005, merl, rgl, package, csv, cxf",
+        ),
         (&ingest, "--theta-h", "linear, sqrt"),
         (
             &["estimate", "realise", paint],

@@ -297,3 +297,106 @@ fn angles_are_drawn_the_same_for_every_paint_and_take_no_samples() {
         );
     }
 }
+
+#[test]
+fn readings_alone_are_ingested_shown_blended_and_drawn() {
+    let desk = Desk::new();
+    let table = "# name: my silver\n# observer: 10\naspecular_deg,L,a,b,graininess\n-15,103.2,-0.9,1.1,4\n\
+                 15,112.9,-1,1.4,4\n25,92.3,-0.9,0.2,4\n45,61.1,-0.7,-0.9,4\n75,44.8,-0.5,-1.4,4\n110,37.6,-0.3,-1.5,4\n";
+    std::fs::write(desk.path("silver.csv"), table).expect("written");
+    let said = desk.ok(&["ingest", "silver.csv", "--json", "--out", "silver.paint"]);
+    let paint = &json(&said.stdout)["paint"];
+    assert_eq!(paint["name"], "my silver");
+    assert_eq!(paint["provenance"]["source"], "csv");
+    assert_eq!(
+        paint["provenance"]["notes"]["graininess"],
+        "-15°: 4, 15°: 4, 25°: 4, 45°: 4, 75°: 4, 110°: 4"
+    );
+    assert_eq!(paint["multi_angle"]["approximate"], true);
+    assert!(
+        paint["multi_angle"]["worst"]
+            .as_f64()
+            .is_some_and(|worst| worst < 0.1),
+        "{paint}"
+    );
+    assert_eq!(paint["energy"]["conserves"], true);
+    let page = desk.ok(&["show", "silver.paint"]).stdout;
+    let page = String::from_utf8_lossy(&page).into_owned();
+    assert!(
+        page.contains("ior 1.5000") && page.contains("flakes         none"),
+        "{page}"
+    );
+
+    // The same readings in a package, which says that there is no coat by saying nothing.
+    let rows: Vec<&str> = table.lines().skip(3).collect();
+    let package = format!(
+        r#"{{"format": "measured-paint", "version": 1, "name": "packed", "color_space": "linear-srgb-d65",
+            "multi_angle": {{"illumination_deg": 45, "illuminant": "D65", "observer": "10",
+            "columns": ["aspecular_deg", "L", "a", "b", "graininess"], "rows": [[{}]]}}}}"#,
+        rows.join("],[")
+    );
+    std::fs::create_dir(desk.path("packed")).expect("a folder");
+    std::fs::write(desk.path("packed/paint.json"), package).expect("written");
+    let said = desk.ok(&["ingest", "packed", "--json", "--out", "packed.paint"]);
+    let packed = &json(&said.stdout)["paint"];
+    assert_eq!(packed["parameters"]["coat"], serde_json::Value::Null);
+    assert!(
+        packed["multi_angle"]["worst"]
+            .as_f64()
+            .is_some_and(|worst| worst < 0.1),
+        "{packed}"
+    );
+
+    desk.ok(&[
+        "blend",
+        "silver.csv",
+        "packed",
+        "sample:blue",
+        "--profile",
+        "draft",
+        "--out",
+        "b.blend",
+    ]);
+    desk.ok(&[
+        "preview",
+        "b.blend",
+        "--weights",
+        "0.4,0.3,0.3",
+        "--size",
+        "16x16",
+        "--spp",
+        "2",
+        "--out",
+        "b.png",
+    ]);
+    desk.ok(&["estimate", "ingest", "silver.csv"]);
+
+    std::fs::write(desk.path("d.json"), r#"{"pairs": [[[0,0,1],[0,0,1]]]}"#).expect("written");
+    for input in ["silver.csv", "packed"] {
+        let said = desk.refused(
+            3,
+            &[
+                "evaluate",
+                "--raw",
+                input,
+                "--directions",
+                "d.json",
+                "--out",
+                "v.json",
+            ],
+        );
+        assert!(said.contains("nothing but readings"), "{said}");
+    }
+    let said = desk.refused(
+        2,
+        &[
+            "ingest",
+            "silver.csv",
+            "--theta-h",
+            "sqrt",
+            "--out",
+            "x.paint",
+        ],
+    );
+    assert!(said.contains("layout csv"), "{said}");
+}

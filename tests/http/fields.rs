@@ -239,7 +239,7 @@ async fn a_silly_parameter_is_refused_with_its_name_its_value_and_what_is_accept
         ("header_bytes=-1", "a whole number from 0 to 1048576"),
         ("coat_ior=nan", "a number from 1 to 4"),
         ("coat_ior=0", "1 to 4"),
-        ("layout=", "rgl, mpi-2005, merl, package"),
+        ("layout=", "rgl, mpi-2005, merl, package, csv, cxf"),
     ] {
         let answer = house
             .ask("POST", &format!("/v1/paints?{query}"), &[], b"x")

@@ -157,6 +157,15 @@ impl Works for Pretend {
         carpaint::service::Workshop::new(carpaint::paint::Limits::default()).readings(paint, angles)
     }
 
+    fn readings_document(
+        &self,
+        paint: &Thing,
+        angles: Option<&[f64]>,
+    ) -> Result<String, WorkError> {
+        let works = carpaint::service::Workshop::new(carpaint::paint::Limits::default());
+        works.readings_document(paint, angles)
+    }
+
     fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkError> {
         carpaint::service::Workshop::new(carpaint::paint::Limits::default()).gloss(paint)
     }

@@ -29,6 +29,26 @@ async fn a_paint_is_read_at_any_angle_above_it() {
             .collect();
         assert_eq!(values, row);
     }
+    let document = house.get(&format!("{address}.cxf?angles=45,-15")).await;
+    assert_eq!(document.header("content-type"), Some("application/xml"));
+    let saved = format!("attachment; filename=\"{id}.readings.cxf\"");
+    assert_eq!(document.header("content-disposition"), Some(saved.as_str()));
+    let document = document.text();
+    for row in rows(&two.json()) {
+        let [angle, l, a, b] = row[..] else {
+            panic!("{row:?}")
+        };
+        for said in [
+            format!("<cc:Aspecular>{angle}</cc:Aspecular>"),
+            format!("<cc:L>{l}</cc:L><cc:A>{a}</cc:A><cc:B>{b}</cc:B>"),
+        ] {
+            assert!(document.contains(&said), "{said}: {document}");
+        }
+    }
+    house
+        .get(&format!("{address}.cxf?angles=135"))
+        .await
+        .problem(400, "invalid-parameter");
     let tag = [("If-None-Match", six.etag())];
     assert_eq!(house.ask("GET", &address, &tag, &[]).await.status, 304);
 

@@ -165,6 +165,86 @@ async fn a_table_is_fitted_with_progress_and_its_fit_can_be_called_off() {
         .await;
     let problem = unknown.problem(422, "unusable-measurement");
     assert_eq!(problem["pointer"], "/layout");
-    assert_eq!(problem["accepted"], "rgl, mpi-2005, merl or package");
+    assert_eq!(
+        problem["accepted"],
+        "rgl, mpi-2005, merl, package, csv or cxf"
+    );
+    house.close().await;
+}
+
+/// Largest distance in L, a, b between two answers of readings.
+fn apart(x: &Value, y: &Value) -> f64 {
+    let numbers = |of: &Value| -> Vec<f64> {
+        let rows: Vec<Vec<f64>> = serde_json::from_value(of["rows"].clone()).expect("numbers");
+        rows.concat()
+    };
+    let (x, y) = (numbers(x), numbers(y));
+    assert_eq!(x.len(), y.len());
+    let off = x.iter().zip(&y).map(|(a, b)| (a - b).abs());
+    off.fold(0.0, f64::max)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn readings_that_were_taken_here_come_back_as_a_paint_that_reads_the_same() {
+    let data = tempfile::tempdir().expect("temporary folder");
+    let house = House::real(data.path()).await;
+    let metal = upload(&house, &metallic("bmw339", 2)).await;
+    let of = |paint: &Value| {
+        format!(
+            "/v1/paints/{}/readings",
+            paint["id"].as_str().expect("an id")
+        )
+    };
+    let read = house.get(&of(&metal)).await.json();
+    for ending in ["csv", "cxf"] {
+        let table = house.get(&format!("{}.{ending}", of(&metal))).await.body;
+        // Whatever coat is assumed, the paint reads what was read.
+        for query in ["", "?coat_ior=1", "?coat_ior=1.7"] {
+            let headers = [("Prefer", "wait=300")];
+            let answer = house
+                .ask("POST", &format!("/v1/paints{query}"), &headers, &table)
+                .await;
+            assert_eq!(
+                answer.status,
+                201,
+                "{}",
+                String::from_utf8_lossy(&answer.body)
+            );
+            let paint = answer.json();
+            assert_eq!(paint["provenance"]["source"], ending);
+            assert!(
+                paint["multi_angle"]["worst"]
+                    .as_f64()
+                    .is_some_and(|worst| worst < 0.1)
+            );
+            let assumed = paint["warnings"].to_string().contains("clear coat");
+            assert_eq!(assumed, query.is_empty(), "{paint}");
+            let off = apart(&house.get(&of(&paint)).await.json(), &read);
+            assert!(off < 0.1, "{ending}{query}: {off}");
+        }
+    }
+    for (body, said) in [
+        ("aspecular_deg,L,a,b\n15,50,x,0\n", "line 2, column a"),
+        (
+            "aspecular_deg,L,a,b\n15,0,0,0\n",
+            "no reading reflects any light",
+        ),
+        ("<CxF/>", "the root is <CxF>"),
+        ("<!DOCTYPE CxF []><CxF/>", "document type"),
+    ] {
+        let answer = house
+            .ask(
+                "POST",
+                "/v1/paints",
+                &[("Prefer", "wait=60")],
+                body.as_bytes(),
+            )
+            .await;
+        let problem = answer.problem(422, "unusable-measurement");
+        assert!(
+            problem["detail"].as_str().is_some_and(|d| d.contains(said)),
+            "{problem}"
+        );
+    }
     house.close().await;
 }

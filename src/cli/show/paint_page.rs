@@ -169,7 +169,10 @@ fn of_flakes(page: &mut Page, file: &PaintFile, flakes: &Flakes) {
 
 fn of_fit(page: &mut Page, file: &PaintFile) {
     let Some(fit) = &file.residuals else {
-        page.line("fit", "none: the base came as a model");
+        page.line(
+            "fit",
+            "none of a table: the base came as a model, or was fitted to readings",
+        );
         return;
     };
     let luminance = |what: &str, of: &LuminanceError| {

@@ -2,23 +2,9 @@
 
 use super::field::Field;
 use crate::color::{Illuminant, Observer};
+use crate::measurement::multi_angle::MultiAngle;
 use crate::measurement::package::PackageError;
 use crate::paint::Limits;
-
-/// Readings of a portable multi-angle instrument, as they came.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MultiAngle {
-    /// Angle of the light from the normal, in air, degrees.
-    pub illumination_deg: f64,
-    /// Light that L, a, b hold for.
-    pub illuminant: Illuminant,
-    /// Observer that L, a, b hold for.
-    pub observer: Observer,
-    /// Names of the columns; the first is `aspecular_deg`.
-    pub columns: Vec<String>,
-    /// One number per column.
-    pub rows: Vec<Vec<f64>>,
-}
 
 pub(super) fn multi_angle(
     field: &Field,
@@ -46,9 +32,7 @@ pub(super) fn multi_angle(
         }
         columns.push(name.to_owned());
     }
-    let has = |name: &str| columns.iter().any(|c| c == name);
-    let colors = has("L") && has("a") && has("b") || columns.iter().any(|c| c.starts_with("nm"));
-    if columns.first().map(String::as_str) != Some("aspecular_deg") || !colors {
+    if !MultiAngle::are_readings(&columns) {
         return list.refuse("aspecular_deg first, then L, a, b or spectral columns nm400 to nm700");
     }
     let mut rows = Vec::new();

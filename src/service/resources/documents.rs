@@ -98,7 +98,7 @@ pub struct PaintSummary {
     pub id: String,
     /// Name.
     pub name: String,
-    /// Kind of source: `package`, `rgl`, `mpi-2005`, `merl`, `sample`, `blend`.
+    /// Kind of source: `package`, `rgl`, `mpi-2005`, `merl`, `csv`, `cxf`, `sample`, `blend`.
     pub source: String,
     /// Whether lists show it.
     pub visibility: Visibility,

@@ -9,7 +9,7 @@ use utoipa::IntoParams;
 
 use crate::service::app::App;
 use crate::service::http::{Address, Answer, Keep, PaintProblems, Problem, ProblemDocument, Query};
-use crate::service::work::{Gloss, Readings, Thing, WorkError, Works};
+use crate::service::work::{CXF_MEDIA_TYPE, Gloss, Readings, Thing, WorkError, Works};
 
 /// Where an instrument looks from.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -76,6 +76,34 @@ pub async fn table(
     let answer = |readings: Readings| {
         let table = Answer::bytes("text/csv", readings.to_csv(), Keep::Revalidated);
         table.saved_as(&format!("{id}.readings.csv"))
+    };
+    read(&app, &id, instrument, answer).await
+}
+
+/// Readings of a paint as a `CxF3` document (ISO 17972-1), which measuring and recipe software reads.
+///
+/// One object with an L, a, b for each angle, each of a specification with the geometry `MultiAngle`. Its dates are the
+/// day of the measurement where the paint knows it (`measured_on`), and 1970-01-01 where it does not.
+#[utoipa::path(
+    get, operation_id = "paint_readings_document", path = "/v1/paints/{id}/readings.cxf", tag = "paints",
+    params(("id" = String, Path, description = "Paint"), ReadingQuery),
+    responses(
+        (status = 200, description = "A color for each angle, in the order asked for", body = String, content_type = "application/xml"),
+        (status = 400, description = "An angle that no instrument reads at", body = ProblemDocument, content_type = "application/problem+json"),
+        PaintProblems,
+    )
+)]
+pub async fn document(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    Query(query): Query<ReadingQuery>,
+) -> Result<Answer, Problem> {
+    let instrument = move |works: &dyn Works, paint: &Thing| {
+        works.readings_document(paint, query.angles.as_deref())
+    };
+    let answer = |document: String| {
+        let document = Answer::bytes(CXF_MEDIA_TYPE, document, Keep::Revalidated);
+        document.saved_as(&format!("{id}.readings.cxf"))
     };
     read(&app, &id, instrument, answer).await
 }

@@ -25,14 +25,14 @@ use crate::workshop::NAME_CHARACTERS;
 const MEASUREMENT: receiving::Expected = receiving::Expected {
     archive: true,
     unusable: Kind::UnusableMeasurement,
-    accepted: "a measured-paint package, an RGL .bsdf, an MPI 2005 table, a MERL binary or a .paint",
+    accepted: "a measured-paint package, an RGL .bsdf, an MPI 2005 table, a MERL binary, readings as CSV or CxF3, or a .paint",
 };
 
 /// How an upload is read and fitted.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub struct IngestQuery {
-    /// Name of the paint, in place of the measurement's own.
+    /// Name of the paint, in place of the measurement's own. Of a `CxF3` document with several paints, the name or Id of one.
     #[param(min_length = 1, max_length = 200)]
     name: Option<String>,
     /// What the file is, where its bytes do not say.
@@ -42,7 +42,8 @@ pub struct IngestQuery {
     /// Bytes before the values of an MPI 2005 table, 84 unless given.
     #[param(maximum = 1_048_576)]
     header_bytes: Option<u64>,
-    /// Give the paint a clear coat of this index of refraction; otherwise the fit decides.
+    /// Give the paint a clear coat of this index of refraction; otherwise the fit decides. Of readings as CSV or `CxF3`, which
+    /// 1 leaves uncoated, it is 1.5 unless given.
     #[param(minimum = 1.0, maximum = 4.0)]
     coat_ior: Option<f64>,
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,clusters=100`.
@@ -101,8 +102,9 @@ impl IngestQuery {
 
 /// Upload a measurement.
 ///
-/// The body is the file itself: a measured-paint package (.zip), an RGL `.bsdf`, an MPI 2005 table, a MERL binary, or a
-/// `.paint`. It is streamed to disk. The same bytes with the same options have the same id: asking again is safe, and
+/// The body is the file itself: a measured-paint package (.zip), an RGL `.bsdf`, an MPI 2005 table, a MERL binary, readings
+/// of a multi-angle instrument as CSV (what `readings.csv` of a paint is, or with `nm400` to `nm700` in place of `L,a,b`) or
+/// `CxF3`, or a `.paint`. Readings alone make a paint that reads the same and has no flakes. It is streamed to disk. The same bytes with the same options have the same id: asking again is safe, and
 /// answers at once. `Prefer: wait=N` waits up to N seconds for the paint; otherwise what takes more than 3 seconds is
 /// answered with the job that goes on.
 #[utoipa::path(

@@ -16,7 +16,8 @@ pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
 pub use crate::measurement::{Layout, ThetaHSpacing};
 pub use crate::workshop::{
-    Estimate, Format, Gloss, Light, Picked, PictureFormat, Readings, Shape, Show, Target, Thing,
+    CXF_MEDIA_TYPE, Estimate, Format, Gloss, Light, Picked, PictureFormat, Readings, Shape, Show,
+    Target, Thing,
 };
 
 /// How an upload becomes a paint.
@@ -209,6 +210,17 @@ pub trait Works: Debug + Send + Sync {
     /// [`WorkError`] for angles that no instrument reads at.
     fn readings(&self, paint: &Thing, aspecular_deg: Option<&[f64]>)
     -> Result<Readings, WorkError>;
+
+    /// The same as a `CxF3` document.
+    ///
+    /// # Errors
+    ///
+    /// As [`Works::readings`].
+    fn readings_document(
+        &self,
+        paint: &Thing,
+        aspecular_deg: Option<&[f64]>,
+    ) -> Result<String, WorkError>;
 
     /// What a glossmeter reads of a paint.
     ///

@@ -185,6 +185,17 @@ impl Works for Workshop {
         Ok(workshop::readings(paint_of(paint)?, aspecular_deg)?)
     }
 
+    fn readings_document(
+        &self,
+        paint: &Thing,
+        aspecular_deg: Option<&[f64]>,
+    ) -> Result<String, WorkError> {
+        Ok(workshop::readings_document(
+            paint_of(paint)?,
+            aspecular_deg,
+        )?)
+    }
+
     fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkError> {
         Ok(workshop::gloss(paint_of(paint)?))
     }

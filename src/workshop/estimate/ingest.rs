@@ -204,6 +204,10 @@ fn of_measurement(
             stages.push(fit_stage());
             return Ok(Sampled::solid(finished(name, stand_in(), None), stages));
         }
+        // A few readings are fitted at once.
+        Measurement::Readings(..) => {
+            return Ok(Sampled::solid(finished(name, stand_in(), None), stages));
+        }
     };
     let mut paint = stand_in();
     paint.coat = package.coat;
@@ -217,7 +221,8 @@ fn of_measurement(
             paint.lobes.clone_from(lobes);
             paint.color_table = color_table.clone();
         }
-        _ => stages.push(fit_stage()),
+        Some(PackageBase::Table { .. }) => stages.push(fit_stage()),
+        None => {}
     }
     let Some(pictures) = &package.flakes else {
         return Ok(Sampled::solid(finished(name, paint, None), stages));

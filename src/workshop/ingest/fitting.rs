@@ -2,6 +2,7 @@
 
 use super::IngestOptions;
 use super::measurement::BareMeasurement;
+use super::readings;
 use crate::accuracy::clustering_error;
 use crate::fit::{
     CoatChoice, FittedBase, against_readings, fit_base, fit_base_telling, fit_flakes,
@@ -9,7 +10,9 @@ use crate::fit::{
 use crate::measurement::{
     HalfAngleTable, Layout, Package, PackageBase, TableLayout, ThetaHSpacing, read_merl, read_mpi,
 };
-use crate::paint::{CarPaint, Clustering, Coat, FitResiduals, PaintFile, Provenance, certify};
+use crate::paint::{
+    CarPaint, Clustering, Coat, ColorTable, FitResiduals, PaintFile, Provenance, certify,
+};
 
 pub(super) fn ingest_brdf(
     bare: &BareMeasurement,
@@ -58,13 +61,7 @@ pub(super) fn ingest_package(
 ) -> Result<PaintFile, String> {
     let mut warnings = package.warnings.clone();
     let mut residuals = None;
-    let coat = match (package.coat, options.coat_ior) {
-        (coat, None) => coat,
-        (coat, Some(ior)) => Some(Coat {
-            ior,
-            ..coat.unwrap_or(Coat::smooth(ior))
-        }),
-    };
+    let coat = coat_of(&package, options);
     // Share of the time that goes into the base: nothing where the lab fitted it, everything where there are no flakes.
     let based = match (&package.base, &package.flakes) {
         (Some(PackageBase::Table { .. }), Some(_)) => 0.4,
@@ -72,11 +69,14 @@ pub(super) fn ingest_package(
         _ => 0.0,
     };
     let mut paint = match &package.base {
-        None => {
-            return Err("base: there is neither a model nor a brdf_table; a paint cannot be fitted from multi_angle \
-                        readings alone yet"
-                .to_owned());
-        }
+        // What the readings say of a base is known once the flakes are.
+        None => CarPaint {
+            coat,
+            diffuse: [0.0; 3],
+            lobes: Vec::new(),
+            color_table: ColorTable::white(),
+            flakes: None,
+        },
         Some(PackageBase::Model {
             diffuse,
             lobes,
@@ -99,7 +99,10 @@ pub(super) fn ingest_package(
             base_paint(&base, coat)
         }
     };
-    ended("base");
+    let of_readings = package.base.is_none();
+    if !of_readings {
+        ended("base");
+    }
     let mut clustering = None;
     if let Some(pictures) = &package.flakes {
         let tell = |done: usize, of: usize| {
@@ -111,32 +114,60 @@ pub(super) fn ingest_package(
         warnings.extend(fitted.warnings);
         paint.flakes = Some(fitted.flakes);
         ended("flakes");
-        clustering = Some(Clustering {
-            error: clustering_error(pictures, &paint),
-            ..fitted.clustering
-        });
+        clustering = Some(fitted.clustering);
+    }
+    if of_readings {
+        let readings = package.multi_angle.as_ref();
+        let readings =
+            readings.ok_or("base: there is neither a model, a brdf_table nor multi_angle")?;
+        let fitted = readings::fitted(readings, coat, paint.flakes.take(), &mut warnings)
+            .map_err(|problem| format!("multi_angle: {problem}"))?;
+        paint = fitted.paint;
+        ended("base");
+    }
+    if let (Some(pictures), Some(clustering)) = (&package.flakes, &mut clustering) {
+        clustering.error = clustering_error(pictures, &paint);
         ended("error");
+    }
+    let mut notes = package.notes;
+    if let Some(readings) = package.multi_angle.as_ref().filter(|_| of_readings) {
+        notes.extend(readings.texture_notes());
     }
     let provenance = Provenance {
         source: Layout::Package.name().to_owned(),
         hashes: vec![hash.to_hex().to_string()],
-        notes: package.notes,
+        notes,
         ..Provenance::default()
     };
     let name = options.name.clone().unwrap_or(package.name);
-    let readings = package
+    let against = package
         .multi_angle
         .as_ref()
         .and_then(|readings| against_readings(&paint, readings));
-    if package.multi_angle.is_some() && readings.is_none() {
+    if package.multi_angle.is_some() && against.is_none() {
         warnings.push(
-            "multi_angle holds no L, a, b at an angle above the surface: it was not compared with the fit"
+            "multi_angle holds no L, a, b and no usable spectrum at an angle above the surface: it was not compared with the \
+             fit"
                 .to_owned(),
         );
     }
     let file = finish(name, provenance, paint, residuals, clustering, warnings);
     ended("certificate");
-    Ok(PaintFile { readings, ..file })
+    Ok(PaintFile {
+        readings: against,
+        ..file
+    })
+}
+
+/// The coat of a package, of the index that the caller says where he says one.
+fn coat_of(package: &Package, options: &IngestOptions) -> Option<Coat> {
+    match (package.coat, options.coat_ior) {
+        (coat, None) => coat,
+        (coat, Some(ior)) => Some(Coat {
+            ior,
+            ..coat.unwrap_or(Coat::smooth(ior))
+        }),
+    }
 }
 
 /// Fits the table of a package inside its coat.

@@ -1,9 +1,9 @@
-//! A measurement, opened: a package, or a bare table or tensor.
+//! A measurement, opened: a package, a bare table or tensor, or readings of an instrument.
 
 use std::path::Path;
 
 use super::IngestOptions;
-use crate::measurement::{BrdfMeasurement, Layout, Package, ReadOptions, sniff};
+use crate::measurement::{BrdfMeasurement, Layout, Package, ReadOptions, ReadingsFile, sniff};
 use crate::paint::Limits;
 use crate::workshop::thing::first_bytes;
 use crate::workshop::{WorkshopError, read};
@@ -15,6 +15,8 @@ pub enum Measurement {
     Package(Box<Package>),
     /// A bare table or tensor.
     Brdf(Box<BareMeasurement>),
+    /// Readings at a few angles.
+    Readings(Box<ReadingsUpload>),
 }
 
 /// A bare table or tensor.
@@ -22,6 +24,17 @@ pub enum Measurement {
 pub struct BareMeasurement {
     /// What was measured.
     pub brdf: BrdfMeasurement,
+    /// How its bytes were laid out.
+    pub layout: Layout,
+    /// BLAKE3 of its bytes.
+    pub hash: blake3::Hash,
+}
+
+/// Readings of an instrument that came as a file of their own.
+#[derive(Debug)]
+pub struct ReadingsUpload {
+    /// What was read.
+    pub file: ReadingsFile,
     /// How its bytes were laid out.
     pub layout: Layout,
     /// BLAKE3 of its bytes.
@@ -76,6 +89,16 @@ pub fn open_measurement(
         ..wrong(&e)
     })?;
     check_mpi_only(layout, &options.read)?;
+    if layout.is_of_readings() {
+        let file = ReadingsFile::read(&bytes, layout, options.name.as_deref(), &options.limits)
+            .map_err(|e| wrong(&e))?;
+        let hash = blake3::hash(&bytes);
+        return Ok(Measurement::Readings(Box::new(ReadingsUpload {
+            file,
+            layout,
+            hash,
+        })));
+    }
     let brdf =
         BrdfMeasurement::read(&bytes, &options.read, &options.limits).map_err(|e| wrong(&e))?;
     let hash = blake3::hash(&bytes);
