@@ -22,7 +22,7 @@ use super::package::PackageError;
 use crate::paint::{Coat, Limits};
 
 /// Name of the manifest in every package.
-pub(super) const MANIFEST: &str = "paint.json";
+pub const MANIFEST: &str = "paint.json";
 /// Latest version of the format that is read.
 const VERSION: u64 = 1;
 

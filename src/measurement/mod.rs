@@ -21,6 +21,7 @@ mod rgl;
 mod table;
 mod tensor;
 
+pub use manifest::MANIFEST;
 pub use merl::read_merl;
 pub use mpi::{MPI_HEADER_BYTES, read_mpi};
 pub use multi_angle::{MultiAngle, ReadColors, ReadColorsError};

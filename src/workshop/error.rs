@@ -2,6 +2,9 @@
 
 use std::fmt::Display;
 
+use crate::fit::FlakeFitError;
+use crate::measurement::{MANIFEST, PackageError};
+
 /// Whose fault it is: decides the exit code and the HTTP status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
@@ -15,6 +18,72 @@ pub enum Fault {
     Internal,
 }
 
+/// Where in what was handed in something is wrong.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Inside {
+    /// File in a package.
+    pub file: Option<String>,
+    /// Field of that file as a JSON pointer.
+    pub pointer: Option<String>,
+}
+
+/// Why something that was handed in becomes no paint.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Refusal {
+    message: String,
+    inside: Inside,
+}
+
+impl Refusal {
+    /// A file of a package is not what it should be; the message names it.
+    pub(super) fn in_file(file: &str, message: String) -> Self {
+        let inside = Inside {
+            file: Some(file.to_owned()),
+            pointer: None,
+        };
+        Self { message, inside }
+    }
+
+    /// A part of a package's manifest is not what it should be.
+    pub(super) fn in_manifest(field: &str, problem: impl Display) -> Self {
+        let inside = Inside {
+            file: Some(MANIFEST.to_owned()),
+            pointer: Some(format!("/{field}")),
+        };
+        let message = format!("{MANIFEST}: {field}: {problem}");
+        Self { message, inside }
+    }
+}
+
+impl From<String> for Refusal {
+    fn from(message: String) -> Self {
+        let inside = Inside::default();
+        Self { message, inside }
+    }
+}
+
+impl From<PackageError> for Refusal {
+    fn from(error: PackageError) -> Self {
+        Self {
+            message: error.to_string(),
+            inside: Inside {
+                file: error.file().map(str::to_owned),
+                pointer: error.pointer(),
+            },
+        }
+    }
+}
+
+impl From<FlakeFitError> for Refusal {
+    fn from(error: FlakeFitError) -> Self {
+        match error {
+            FlakeFitError::Picture(error) => error.into(),
+            FlakeFitError::NoTexel { ref slice, .. } => Self::in_file(slice, error.to_string()),
+            _ => error.to_string().into(),
+        }
+    }
+}
+
 /// A use case that failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{message}")]
@@ -23,6 +92,8 @@ pub struct WorkshopError {
     pub fault: Fault,
     /// The field or option that is wrong, where one can be named.
     pub field: Option<String>,
+    /// Where in what was handed in, where that can be said.
+    pub inside: Inside,
     /// What is wrong, with the value and what would be accepted.
     pub message: String,
 }
@@ -49,6 +120,7 @@ impl WorkshopError {
         Self {
             fault: Fault::Usage,
             field: Some(field.to_owned()),
+            inside: Inside::default(),
             message: message.to_string(),
         }
     }
@@ -58,7 +130,16 @@ impl WorkshopError {
         Self {
             fault: Fault::Input,
             field: None,
+            inside: Inside::default(),
             message: format!("{name}: {problem}"),
+        }
+    }
+
+    /// A measurement that becomes no paint; `name` is what the caller knows it by.
+    pub(super) fn refused(name: impl Display, refusal: Refusal) -> Self {
+        Self {
+            inside: refusal.inside,
+            ..Self::input(name, refusal.message)
         }
     }
 
@@ -67,6 +148,7 @@ impl WorkshopError {
         Self {
             fault: Fault::Output,
             field: None,
+            inside: Inside::default(),
             message: format!("{name}: {problem}"),
         }
     }
@@ -76,6 +158,7 @@ impl WorkshopError {
         Self {
             fault: Fault::Internal,
             field: None,
+            inside: Inside::default(),
             message: problem.to_string(),
         }
     }

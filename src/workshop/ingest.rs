@@ -155,7 +155,7 @@ fn ingest_called(
             ingest_package(*package, hash, options, progress, ended)
         }
     }
-    .map_err(|problem| WorkshopError::input(path.display(), problem))?;
+    .map_err(|refusal| WorkshopError::refused(path.display(), refusal))?;
     file.paint
         .validate(&options.limits)
         .map_err(|problem| WorkshopError::input(path.display(), problem))?;

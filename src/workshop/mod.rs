@@ -27,7 +27,7 @@ pub use crate::render::{Environment, EnvironmentError, EnvironmentFile, Environm
 pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};
-pub use error::{Fault, WorkshopError, accepted};
+pub use error::{Fault, Inside, WorkshopError, accepted};
 pub use estimate::{Estimate, EstimatedError, PictureWork, Stage, Work, sample_to_estimate};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{

@@ -13,7 +13,7 @@ use carpaint::service::{
     Progress, Readings, ServiceConfig, Target, Thing, View, WorkError, Works, Workshop, open,
     serve,
 };
-use carpaint::workshop::{Environment, EstimatedError, sample_by_name};
+use carpaint::workshop::{Environment, EstimatedError, Inside, sample_by_name};
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
@@ -29,6 +29,7 @@ fn refuse(fault: Fault, message: impl Into<String>) -> WorkError {
     WorkError {
         fault,
         field: None,
+        inside: Inside::default(),
         message: message.into(),
     }
 }

@@ -1,5 +1,6 @@
 //! The service with the real workshop behind it: uploads that are fitted, grids that differ, work that is called off.
 
+use std::io::{Cursor, Write};
 use std::time::{Duration, Instant};
 
 use carpaint::accuracy::Profile;
@@ -245,6 +246,61 @@ async fn readings_that_were_taken_here_come_back_as_a_paint_that_reads_the_same(
             problem["detail"].as_str().is_some_and(|d| d.contains(said)),
             "{problem}"
         );
+    }
+    house.close().await;
+}
+
+/// A package of a manifest alone.
+fn package(manifest: &Value) -> Vec<u8> {
+    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let stored = zip::write::SimpleFileOptions::default();
+    zip.start_file("paint.json", stored).expect("an entry");
+    zip.write_all(manifest.to_string().as_bytes())
+        .expect("written");
+    zip.finish().expect("a package").into_inner()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_refused_package_is_pointed_into() {
+    let data = tempfile::tempdir().expect("temporary folder");
+    let house = House::real(data.path()).await;
+    let lobe = json!({ "weight": 0.1, "alpha": 0.2, "f0": 0.5 });
+    let manifest = json!({
+        "format": "measured-paint", "version": 1, "name": "one", "color_space": "linear-srgb-d65",
+        "base": { "model": { "diffuse": 0.2, "lobes": [lobe] } },
+        "flakes": { "slices": "s_{h:02}_{i:02}.exr", "theta_h_deg": [0.0, 5.0], "theta_i_deg": [0.0, 5.0],
+            "texel_um": 10.0, "size_px": [8, 8] },
+    });
+    let with = |pointer: &str, value: Value| {
+        let mut other = manifest.clone();
+        *other.pointer_mut(pointer).expect("a field") = value;
+        other
+    };
+    for (wrong, file, pointer) in [
+        (
+            with("/base/model/lobes/0/alpha", json!(-1)),
+            "paint.json",
+            "/base/model/lobes/0/alpha",
+        ),
+        (
+            with("/flakes/theta_h_deg", json!([5.0, 0.0])),
+            "paint.json",
+            "/flakes/theta_h_deg/1",
+        ),
+        (with("/version", json!(9)), "paint.json", "/version"),
+        (manifest.clone(), "s_00_00.exr", ""),
+    ] {
+        let answer = house
+            .ask(
+                "POST",
+                "/v1/paints",
+                &[("Prefer", "wait=60")],
+                &package(&wrong),
+            )
+            .await;
+        let problem = answer.problem(422, "unusable-measurement");
+        assert_eq!(problem["file"], file, "{problem}");
+        assert_eq!(problem["pointer"], pointer, "{problem}");
     }
     house.close().await;
 }

@@ -106,8 +106,66 @@ pub enum PackageError {
     },
 }
 
+impl PackageError {
+    /// The file in the package that is wrong, where it is one.
+    #[must_use]
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::Open { .. } | Self::Archive { .. } | Self::Entries { .. } => None,
+            Self::Field { .. } | Self::Newer { .. } => Some(MANIFEST),
+            Self::Missing { file, .. }
+            | Self::Size { file, .. }
+            | Self::Damaged { file, .. }
+            | Self::Picture { file, .. }
+            | Self::DeadPixels { file, .. }
+            | Self::ColorTable { file, .. } => Some(file),
+        }
+    }
+
+    /// The field of the manifest that is wrong, where it is one, as a JSON pointer (RFC 6901).
+    #[must_use]
+    pub fn pointer(&self) -> Option<String> {
+        match self {
+            Self::Field { field, .. } => {
+                let tokens = field.split(['.', '[']).filter(|token| !token.is_empty());
+                let tokens = tokens.map(|token| format!("/{}", token.trim_end_matches(']')));
+                Some(tokens.collect())
+            }
+            Self::Newer { .. } => Some("/version".to_owned()),
+            _ => None,
+        }
+    }
+}
+
 fn packed_with_folder(inside: Option<&str>) -> String {
     inside.map_or_else(String::new, |inside| {
         format!("; it holds {inside}: pack what is in the folder, not the folder itself")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_of_the_manifest_is_pointed_at() {
+        let field = |field: &str| PackageError::Field {
+            field: field.to_owned(),
+            value: "-1".to_owned(),
+            accepted: "above 0".to_owned(),
+        };
+        for (path, pointer) in [
+            ("flakes.theta_h_deg[3]", "/flakes/theta_h_deg/3"),
+            (
+                "base.model.lobes[0].weight[2]",
+                "/base/model/lobes/0/weight/2",
+            ),
+            ("multi_angle.rows[1][4]", "/multi_angle/rows/1/4"),
+            ("name", "/name"),
+            ("", ""),
+        ] {
+            assert_eq!(field(path).pointer().as_deref(), Some(pointer));
+            assert_eq!(field(path).file(), Some("paint.json"));
+        }
+    }
 }

@@ -40,6 +40,7 @@ pub struct Problem {
     kind: Kind,
     detail: String,
     field: Option<(Place, String)>,
+    file: Option<String>,
     accepted: Option<String>,
 }
 
@@ -61,6 +62,10 @@ pub struct ProblemDocument {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = "/paints/1")]
     pub pointer: Option<String>,
+    /// The offending file in an uploaded package; `pointer` points into it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "paint.json")]
+    pub file: Option<String>,
     /// Where the field stands.
     #[serde(default, skip_serializing_if = "Option::is_none", rename = "in")]
     pub place: Option<Place>,
@@ -80,6 +85,7 @@ impl Problem {
             kind,
             detail: detail.into(),
             field: None,
+            file: None,
             accepted: None,
         }
     }
@@ -166,6 +172,7 @@ impl Problem {
             status: status.as_u16(),
             detail: self.detail.clone(),
             pointer,
+            file: self.file.clone(),
             place,
             accepted: self.accepted.clone(),
             request_id: request_id.map(str::to_owned),
@@ -183,6 +190,7 @@ impl Problem {
             kind,
             detail: document.detail,
             field: document.place.zip(document.pointer),
+            file: document.file,
             accepted: document.accepted,
         }
     }
@@ -217,11 +225,15 @@ impl WorkError {
         if self.fault != Fault::Upload {
             return self.of_query();
         }
-        let problem = Problem::new(Kind::UnusableMeasurement, &*self.message);
-        self.accepting(match &self.field {
-            Some(field) => problem.at(Place::Query, format!("/{field}")),
-            // The body as a whole.
-            None => problem.at(Place::Body, ""),
+        let problem = Problem {
+            file: self.inside.file.clone(),
+            ..Problem::new(Kind::UnusableMeasurement, &*self.message)
+        };
+        self.accepting(match (&self.field, &self.inside.pointer) {
+            (Some(field), _) => problem.at(Place::Query, format!("/{field}")),
+            (None, Some(pointer)) => problem.at(Place::Body, pointer),
+            // The body, or the file in it, as a whole.
+            (None, None) => problem.at(Place::Body, ""),
         })
     }
 

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::paint::{NotFinite, PaintFile};
-use crate::workshop::Environment;
+use crate::workshop::{Environment, Inside};
 
 /// Share done, from 0 to 1. It does not return when the work was called off.
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
@@ -128,6 +128,8 @@ pub struct WorkError {
     pub fault: Fault,
     /// The field that is wrong, where one can be named.
     pub field: Option<String>,
+    /// Where in an upload, where that can be said.
+    pub inside: Inside,
     /// What is wrong, with the value and what would be accepted.
     pub message: String,
 }
@@ -137,6 +139,7 @@ impl From<NotFinite> for WorkError {
         Self {
             fault: Fault::Internal,
             field: None,
+            inside: Inside::default(),
             message: error.to_string(),
         }
     }

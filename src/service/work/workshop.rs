@@ -40,6 +40,7 @@ impl From<WorkshopError> for WorkError {
         Self {
             fault,
             field: error.field,
+            inside: error.inside,
             message: error.message,
         }
     }

@@ -13,6 +13,7 @@ use crate::measurement::{
 use crate::paint::{
     CarPaint, Clustering, Coat, ColorTable, FitResiduals, PaintFile, Provenance, certify,
 };
+use crate::workshop::error::Refusal;
 
 pub(super) fn ingest_brdf(
     bare: &BareMeasurement,
@@ -20,7 +21,7 @@ pub(super) fn ingest_brdf(
     options: &IngestOptions,
     progress: &(dyn Fn(f32) + Sync),
     ended: &dyn Fn(&'static str),
-) -> Result<PaintFile, String> {
+) -> Result<PaintFile, Refusal> {
     let brdf = &bare.brdf;
     let coat = options
         .coat_ior
@@ -58,7 +59,7 @@ pub(super) fn ingest_package(
     options: &IngestOptions,
     progress: &(dyn Fn(f32) + Sync),
     ended: &dyn Fn(&'static str),
-) -> Result<PaintFile, String> {
+) -> Result<PaintFile, Refusal> {
     let mut warnings = package.warnings.clone();
     let mut residuals = None;
     let coat = coat_of(&package, options);
@@ -89,11 +90,11 @@ pub(super) fn ingest_package(
             flakes: None,
         },
         Some(base @ PackageBase::Table { file, .. }) => {
-            let table = table_of(base)?;
+            let table = table_of(base).map_err(|e| Refusal::in_file(file, e))?;
             let choice = CoatChoice::Inside(coat.map_or(1.0, |c| c.ior));
             let tell = |share: f32| progress(based * share);
-            let base =
-                fit_base_telling(&table, choice, &tell).map_err(|e| format!("{file}: {e}"))?;
+            let base = fit_base_telling(&table, choice, &tell)
+                .map_err(|e| Refusal::in_file(file, format!("{file}: {e}")))?;
             warnings.extend(base.warnings.iter().cloned());
             residuals = Some(base.residuals.clone());
             base_paint(&base, coat)
@@ -109,8 +110,7 @@ pub(super) fn ingest_package(
             #[allow(clippy::cast_precision_loss)] // a progress bar
             progress(based + (1.0 - based) * done as f32 / of as f32);
         };
-        let fitted =
-            fit_flakes(pictures, &options.profile.flakes, &tell).map_err(|e| e.to_string())?;
+        let fitted = fit_flakes(pictures, &options.profile.flakes, &tell)?;
         warnings.extend(fitted.warnings);
         paint.flakes = Some(fitted.flakes);
         ended("flakes");
@@ -118,10 +118,12 @@ pub(super) fn ingest_package(
     }
     if of_readings {
         let readings = package.multi_angle.as_ref();
-        let readings =
-            readings.ok_or("base: there is neither a model, a brdf_table nor multi_angle")?;
+        let readings = readings.ok_or_else(|| {
+            let problem = "there is neither a model, a brdf_table nor multi_angle";
+            Refusal::in_manifest("base", problem)
+        })?;
         let fitted = readings::fitted(readings, coat, paint.flakes.take(), &mut warnings)
-            .map_err(|problem| format!("multi_angle: {problem}"))?;
+            .map_err(|problem| Refusal::in_manifest("multi_angle", problem))?;
         paint = fitted.paint;
         ended("base");
     }

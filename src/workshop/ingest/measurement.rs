@@ -75,7 +75,8 @@ pub fn open_measurement(
     };
     if is_package {
         check_mpi_only(Layout::Package, &options.read)?;
-        let package = Package::open(path, &options.limits).map_err(|e| wrong(&e))?;
+        let package = Package::open(path, &options.limits)
+            .map_err(|e| WorkshopError::refused(path.display(), e.into()))?;
         return Ok(Measurement::Package(Box::new(package)));
     }
     let held = Limits {

@@ -6,6 +6,7 @@ use super::measurement::ReadingsUpload;
 use crate::fit::{PaintFromReadings, against_readings, paint_from_readings};
 use crate::measurement::MultiAngle;
 use crate::paint::{Coat, Flakes, PaintFile, Provenance};
+use crate::workshop::error::Refusal;
 
 /// Index of the clear coat that is assumed where a file cannot say: that of the resins which cars are lacquered with.
 const ASSUMED_IOR: f64 = 1.5;
@@ -16,7 +17,7 @@ pub(super) fn ingest_readings(
     name: String,
     options: &IngestOptions,
     ended: &dyn Fn(&'static str),
-) -> Result<PaintFile, String> {
+) -> Result<PaintFile, Refusal> {
     let file = upload.file;
     let mut warnings = file.warnings;
     let coat = match options.coat_ior {
