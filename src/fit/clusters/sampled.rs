@@ -179,10 +179,17 @@ impl Ways {
             *to = self.first[bucket_of(*lightness, self.buckets)];
         }
         for _ in 0..self.depth {
+            let mut moved = 0;
             for (k, to) in to.iter_mut().enumerate() {
                 let step = &self.steps[*to as usize];
                 let above = lab[step.axis][k] >= step.pivot;
-                *to = step.next[usize::from(above)];
+                let next = step.next[usize::from(above)];
+                moved |= next ^ *to;
+                *to = next;
+            }
+            // Where all have arrived, what is left of the deepest way leads nowhere.
+            if moved == 0 {
+                break;
             }
         }
         for to in to {
