@@ -46,7 +46,8 @@ impl ResultError {
 
     fn of(terms: Vec<Term>) -> Self {
         Self {
-            lab: terms.iter().map(|term| term.lab).sum(),
+            // An empty sum of f64 is -0.
+            lab: (terms.iter().map(|term| term.lab).sum::<Option<f64>>()).map(|sum| sum + 0.0),
             terms,
         }
     }

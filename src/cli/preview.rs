@@ -196,6 +196,7 @@ impl Preview {
             environment,
             lights: None,
         };
+        let progress = Progress::new("looking for samples");
         let picked = self.target.pick(&Work::Preview(PictureWork {
             thing: &thing,
             weights: weights.as_ref(),
@@ -204,7 +205,10 @@ impl Preview {
             limits: &options.limits,
             written: true,
         }))?;
+        drop(progress);
         if let Some(picked) = &picked {
+            // Before the wait, not after it.
+            eprintln!("target {}", picked.line());
             wanted.samples_per_pixel = picked.profile().samples_per_pixel;
         }
         stages.end("open");
@@ -223,6 +227,12 @@ impl Preview {
         stages.end("write");
         stages.write(self.timings.as_deref())?;
         let size = format!("{} x {}", self.frame.size.width, self.frame.size.height);
-        made::tell(json, &self.out, &made, picked.as_ref(), &size)
+        made::tell(
+            json,
+            &self.out,
+            &made,
+            picked.as_ref().filter(|_| json),
+            &size,
+        )
     }
 }

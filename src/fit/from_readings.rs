@@ -15,11 +15,13 @@
 
 mod colors;
 mod curve;
+mod doubts;
 
 use std::f64::consts::PI;
 
-use self::colors::fit_colors;
+use self::colors::{MOST_OF_CURVE, fit_colors};
 use self::curve::fit_curve;
+use self::doubts::{degrees, doubts};
 use crate::color::{Lab, LinearRgb, luminance};
 use crate::measurement::{MultiAngle, ReadColors, ReadColorsError};
 use crate::paint::{
@@ -30,6 +32,9 @@ use crate::paint::{
 const LEAST_ANGLES_OF_A_LOBE: usize = 3;
 /// Share of a reading by which flakes may outshine it before that is told: what instruments of one kind differ by.
 const OUTSHONE: f64 = 0.01;
+/// Angle from the normal beyond which a reading is not believed, of light or viewer: there a coat lets nothing in or out,
+/// and what little was read would make anything of the base.
+const GRAZING_DEG: f64 = 85.0;
 /// Luminance that counts as black, 1/sr: L = 0.3.
 const BLACK: f64 = 1e-4;
 
@@ -49,10 +54,10 @@ pub enum ReadingsFitError {
     /// Readings without colors.
     #[error("{0}")]
     Colors(#[from] ReadColorsError),
-    /// Light or every viewer at or below the horizon.
+    /// Light or every viewer too near to the horizon, or below.
     #[error(
-        "with light at {illumination_deg}° none of {rows} readings has its viewer above the paint; accepted are aspecular \
-         angles less than 90° from that of the light"
+        "with light at {illumination_deg}° none of {rows} readings can be fitted, accepted are light and viewer up to \
+         {GRAZING_DEG}° from the normal: aspecular angles up to {GRAZING_DEG}° from that of the light"
     )]
     NoViewer {
         /// Angle of the light, degrees.
@@ -63,6 +68,9 @@ pub enum ReadingsFitError {
     /// Nothing above black.
     #[error("no reading reflects any light, accepted is at least one with L above 0")]
     Dark,
+    /// No color table.
+    #[error("no color table reproduces the readings, accepted are readings that differ by less")]
+    NoColors,
     /// Values that no reflectance takes.
     #[error(
         "{field} would be {value:e}, accepted is up to 1000: the readings are no reflectance factors"
@@ -122,7 +130,7 @@ pub fn paint_from_readings(
     }
     if left_out > 0 {
         warnings.push(format!(
-            "{left_out} of {} readings have their viewer at or below the horizon and were left out",
+            "{left_out} of {} readings were left out: their light or their viewer is more than {GRAZING_DEG}° from the normal",
             colors.rows.len()
         ));
     }
@@ -136,6 +144,7 @@ pub fn paint_from_readings(
             angles.len()
         ));
     }
+    warnings.extend(doubts(&colors, &reads));
     if let Some(most) = reads
         .iter()
         .max_by(|a, b| a.below_zero.total_cmp(&b.below_zero))
@@ -156,18 +165,28 @@ pub fn paint_from_readings(
             return Err(ReadingsFitError::NotAReflectance { field, value });
         }
     }
-    let fitted = fit_colors(&reads, &curve);
-    if fitted.mapped > 0 {
+    let fitted = fit_colors(&reads, &curve).ok_or(ReadingsFitError::NoColors)?;
+    if !fitted.mapped.is_empty() {
         warnings.push(format!(
-            "{} colors of the color table lay outside sRGB and became the nearest color inside",
-            fitted.mapped
+            "what was read at {} lies outside sRGB, or is less than no light, and became the nearest color inside",
+            degrees(&fitted.mapped)
+        ));
+    }
+    if !fitted.held.is_empty() {
+        warnings.push(format!(
+            "the reading at {} is more than {MOST_OF_CURVE} times what lobes explain of it, which is as much as was kept",
+            degrees(&fitted.held)
         ));
     }
     warnings.push(if curve.angles < LEAST_ANGLES_OF_A_LOBE {
+        let so_few = if curve.angles == 1 {
+            "one half angle says"
+        } else {
+            "two half angles say"
+        };
         format!(
-            "{} half angles say nothing of how the paint darkens between them: the base is diffuse, its color by angle is \
-             the readings'; 3 readings or more on one side of the mirror direction make lobes",
-            curve.angles
+            "{so_few} nothing of how the paint darkens between them: the base is diffuse, its color by angle is the \
+             readings'; 3 readings or more on one side of the mirror direction make lobes"
         )
     } else {
         format!(
@@ -185,10 +204,13 @@ pub fn paint_from_readings(
     Ok(PaintFromReadings { paint, warnings })
 }
 
-/// Readings as BRDF inside the coat, without flakes; those whose viewer is above the paint.
+/// Readings as BRDF inside the coat, without flakes; those that are believed.
 fn reads(illumination_deg: f64, colors: &ReadColors, without_base: &CarPaint) -> Vec<Read> {
     let reflectance = Reflectance::new(without_base);
     let read = |&(aspecular_deg, lab): &(f64, Lab)| {
+        if !is_believed(illumination_deg, aspecular_deg) {
+            return None;
+        }
         let (wi, wo) = directions(illumination_deg, aspecular_deg);
         let terms = reflectance.terms(wi, wo, Chi::Overall)?;
         let factor = colors.rgb(lab);
@@ -212,6 +234,13 @@ fn reads(illumination_deg: f64, colors: &ReadColors, without_base: &CarPaint) ->
         })
     };
     colors.rows.iter().filter_map(read).collect()
+}
+
+/// Whether light and viewer are far enough above the paint for a reading to say something of it.
+pub(super) fn is_believed(illumination_deg: f64, aspecular_deg: f64) -> bool {
+    [illumination_deg, illumination_deg - aspecular_deg]
+        .iter()
+        .all(|angle| angle.abs() <= GRAZING_DEG)
 }
 
 /// Directions of light and viewer in air, both in the plane of incidence.

@@ -2,14 +2,14 @@
 
 use std::f64::consts::PI;
 
-use super::from_readings::directions;
+use super::from_readings::{directions, is_believed};
 use crate::color::{D65_2, Lab, adapted, ciede2000, rgb_to_xyz};
 use crate::measurement::MultiAngle;
 use crate::paint::{CarPaint, Chi, ReadingError, ReadingResiduals, Reflectance};
 
 /// Compares a paint, flakes at their mean and the coat's mirror image left out, with readings.
 ///
-/// `None` where the readings hold no colors, or none whose viewer is above the paint. Compared is under the readings'
+/// `None` where the readings hold no colors, or none with light and viewer well above the paint. Compared is under the readings'
 /// own light, to which the paint's color is adapted, and of spectra under D65; L, a, b of another observer than the 2°
 /// keep their numbers, which is marked as approximate: to convert them takes spectra. Model description, section 8.
 #[must_use]
@@ -20,10 +20,10 @@ pub fn against_readings(paint: &CarPaint, readings: &MultiAngle) -> Option<Readi
         .rows
         .iter()
         .filter_map(|&(aspecular_deg, read)| {
-            let (wi, wo) = directions(readings.illumination_deg, aspecular_deg);
-            if wo[2] <= 0.0 || wi[2] <= 0.0 {
+            if !is_believed(readings.illumination_deg, aspecular_deg) {
                 return None;
             }
+            let (wi, wo) = directions(readings.illumination_deg, aspecular_deg);
             let factor = reflectance.evaluate(wi, wo, Chi::Table).map(|f| f * PI);
             let xyz = adapted(rgb_to_xyz(factor), D65_2, colors.white);
             Some(ReadingError {

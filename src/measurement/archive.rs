@@ -16,6 +16,9 @@ use zip::{CompressionMethod, ZipArchive};
 use super::package::PackageError;
 use crate::paint::Limits;
 
+/// What every workbook of a spreadsheet program holds, which is an archive too.
+pub(super) const WORKBOOK: &str = "[Content_Types].xml";
+
 /// Where the bytes of an archive are.
 #[derive(Clone, Debug)]
 pub(super) enum Source {
@@ -232,12 +235,16 @@ impl Archive {
     }
 
     /// The first file of this name that stands inside a folder of the archive.
-    fn inside_a_folder(&self, name: &str) -> Option<String> {
+    fn instead_of(&self, name: &str) -> Option<String> {
         let Self::Zip { index, .. } = self else {
             return None;
         };
         let within = |path: &&String| path.strip_suffix(name).is_some_and(|p| p.ends_with('/'));
-        index.keys().filter(within).min().cloned()
+        let in_other_case = |path: &&String| path.eq_ignore_ascii_case(name);
+        let found = index.keys().filter(within).min();
+        let found = found.or_else(|| index.keys().filter(in_other_case).min());
+        let found = found.or_else(|| index.get_key_value(WORKBOOK).map(|(path, _)| path));
+        found.cloned()
     }
 
     /// Replaces `into` by the file of this name, at most `most` bytes of it.
@@ -260,7 +267,7 @@ impl Archive {
         };
         let missing = || PackageError::Missing {
             file: name.to_owned(),
-            inside: self.inside_a_folder(name),
+            inside: self.instead_of(name),
         };
         match self {
             Self::Zip {

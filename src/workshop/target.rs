@@ -4,13 +4,15 @@
 //! estimate's error is of a sample of the slices, the error is measured in full before a profile is picked for it. What
 //! is picked for a time limit depends on the machine; the result depends on the profile picked and on nothing else.
 
+mod samples;
+
 use std::time::Instant;
 
 use serde::Serialize;
 
-use super::estimate::{Estimate, Work, estimate_preview};
+use super::estimate::{Estimate, Work};
 use super::realising::{Format, choose, error_of};
-use super::{MOST_SAMPLES, WorkshopError, blend_paints};
+use super::{WorkshopError, blend_paints};
 use crate::accuracy::{Profile, blend_error, file_error, writing_error};
 use crate::export::{ExportSettings, Precision};
 use crate::fit::ClusterSettings;
@@ -41,7 +43,24 @@ pub struct Picked {
     pub searched: f64,
 }
 
+/// A search for a profile, and when it began.
+struct Search(Instant);
+
+impl Search {
+    fn seconds(&self) -> f64 {
+        self.0.elapsed().as_secs_f64()
+    }
+}
+
 impl Picked {
+    /// The same as it is for who finds it at hand, without a search of his own.
+    #[must_use]
+    pub fn at_hand(mut self) -> Self {
+        self.searched = 0.0;
+        self.met = self.target.is_met(&self.estimate, 0.0);
+        self
+    }
+
     /// The profile.
     #[must_use]
     pub const fn profile(&self) -> &Profile {
@@ -58,8 +77,10 @@ impl Picked {
             ..
         } = &self.estimate;
         format!(
-            "{}; profile={profile}, error={error}, seconds={seconds:.3}",
+            "{}; profile={profile}, samples_per_pixel={}, error={error}, seconds={seconds:.3}, searched={:.3}",
             if self.met { "met" } else { "not met" },
+            self.profile().samples_per_pixel,
+            self.searched,
         )
     }
 }
@@ -109,60 +130,39 @@ impl Target {
     /// [`WorkshopError`] for limits that are none, and for what would be refused when the work is done.
     pub fn pick(&self, work: &Work<'_>) -> Result<Picked, WorkshopError> {
         self.check()?;
-        let begun = Instant::now();
-        let searched = || begun.elapsed().as_secs_f64();
-        let mut small_pictures = None;
-        let mut look = |profile: &Profile| {
-            let mut estimate = match work {
-                Work::Preview(picture) => {
-                    estimate_preview(picture, profile, Some(&mut small_pictures))
-                }
-                _ => work.estimate(profile),
-            }?;
-            let too_slow = !self.is_in_time(&estimate, searched());
+        let search = Search(Instant::now());
+        if let Work::Preview(picture) = work {
+            return samples::pick_samples(self, picture, &search);
+        }
+        let mut estimates = Vec::new();
+        // From cheap to dear: what comes after one that is accurate enough, or too slow, need not be looked at.
+        for profile in ladder(work) {
+            let mut estimate = work.estimate(&profile)?;
+            let too_slow = !self.is_in_time(&estimate, search.seconds());
             if self.max_error.is_some() && !too_slow {
-                measure_error(work, profile, &mut estimate)?;
+                measure_error(work, &profile, &mut estimate)?;
             }
-            let enough = self.max_error.is_some() && self.is_met(&estimate, searched());
-            Ok::<_, WorkshopError>((estimate, enough, too_slow))
-        };
-        let (ladder, first) = ladder(work);
-        let (estimate, mut enough, mut too_slow) = look(&ladder[first])?;
-        let mut estimates = vec![estimate];
-        if enough || too_slow {
-            // Cheaper ones, as long as they are accurate enough, or until one is in time; when the time is up already, the
-            // cheapest.
-            let late = self.max_seconds.is_some_and(|most| searched() > most);
-            let skipped = if late { first.saturating_sub(1) } else { 0 };
-            for profile in ladder[..first].iter().rev().skip(skipped) {
-                let (estimate, still_enough, still_too_slow) = look(profile)?;
-                estimates.insert(0, estimate);
-                if (enough && !still_enough) || (too_slow && !still_too_slow) {
-                    break;
-                }
-            }
-        } else {
-            // Dearer ones: what comes after one that is accurate enough, or too slow, need not be looked at.
-            for profile in &ladder[first + 1..] {
-                let estimate;
-                (estimate, enough, too_slow) = look(profile)?;
-                estimates.push(estimate);
-                if enough || too_slow {
-                    break;
-                }
+            let enough = self.max_error.is_some() && self.is_met(&estimate, search.seconds());
+            estimates.push(estimate);
+            if enough || too_slow {
+                break;
             }
         }
-        let (tried, searched) = (estimates.len(), searched());
+        let (tried, searched) = (estimates.len(), search.seconds());
         let estimate = self
             .best(estimates, searched)
             .ok_or_else(|| WorkshopError::internal("there is no profile to pick from"))?;
-        Ok(Picked {
+        Ok(self.picked(estimate, tried, searched))
+    }
+
+    fn picked(&self, estimate: Estimate, tried: usize, searched: f64) -> Picked {
+        Picked {
             target: *self,
             met: self.is_met(&estimate, searched),
             estimate,
             tried,
             searched,
-        })
+        }
     }
 
     /// Of estimates from cheap to dear: with a largest error the cheapest that meets all, with a longest time alone the
@@ -189,16 +189,15 @@ impl Target {
     }
 }
 
-/// Profiles to pick from, by what the work's accuracy depends on, from cheap to dear, and the place of the one to look at
-/// first.
-fn ladder(work: &Work<'_>) -> (Vec<Profile>, usize) {
+/// Profiles to pick from, by what the work's accuracy depends on, from cheap to dear.
+fn ladder(work: &Work<'_>) -> Vec<Profile> {
     let standard = Profile::standard();
     let clustered = |clusters, angle_step| ClusterSettings {
         clusters,
         angle_step,
         ..standard.flakes
     };
-    let profiles = match work {
+    match work {
         Work::Ingest { .. } => [
             (24, 2),
             (12, 1),
@@ -229,11 +228,12 @@ fn ladder(work: &Work<'_>) -> (Vec<Profile>, usize) {
                 Profile::reference(),
             ]
         }
-        // Of the formats only textures are rounded.
+        // Of the formats only textures are rounded; of a picture any number of samples may be picked.
         Work::Realise {
             format: Format::Glb | Format::Paint,
             ..
-        } => vec![standard],
+        }
+        | Work::Preview(_) => vec![standard],
         Work::Realise { .. } => [Precision::Eight, Precision::F16, Precision::F32]
             .into_iter()
             .map(|precision| Profile {
@@ -244,24 +244,7 @@ fn ladder(work: &Work<'_>) -> (Vec<Profile>, usize) {
                 ..standard
             })
             .collect(),
-        Work::Preview(picture) => [1, 4, 16, 64, 256, 1024]
-            .into_iter()
-            .filter(|samples| {
-                let [width, height] = picture.options.size.map(u64::from);
-                *samples == 1 || width * height * u64::from(*samples) <= MOST_SAMPLES
-            })
-            .map(|samples_per_pixel| Profile {
-                samples_per_pixel,
-                ..standard
-            })
-            .collect(),
-    };
-    // The small pictures that tell how long 16 samples take tell it of all above.
-    let first = match work {
-        Work::Preview(_) => profiles.len().min(3) - 1,
-        _ => 0,
-    };
-    (profiles, first)
+    }
 }
 
 /// Replaces an error that was estimated on some slices by the one of all.

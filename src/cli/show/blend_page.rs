@@ -5,7 +5,6 @@ use serde_json::{Value, json};
 use super::page::{Page, range};
 use crate::accuracy::blend_error;
 use crate::blend::{Blend, Order};
-use crate::transport::Cost;
 
 /// The page of a blend.
 pub fn blend_page(blend: &Blend) -> String {
@@ -81,26 +80,23 @@ fn of_transport(page: &mut Page, blend: &Blend) {
     let report = blend.report();
     let called = |places: &[usize]| called(blend, places);
     let settings = blend.settings();
-    let (unit, distance) = match settings.cost {
-        Cost::Distance => ("Lab", "distance"),
-        Cost::SquaredDistance => ("Lab²", "squared distance"),
-    };
     let order = match settings.order {
         Order::Canonical => "by content hash",
         Order::Cheapest => "the cheapest of all",
     };
-    let method = match json!(settings.method) {
-        Value::String(name) => name,
+    let named = |value: Value| match value {
+        Value::String(name) => name.replace('_', " "),
         other => other.to_string(),
     };
+    let (method, cost) = (named(json!(settings.method)), named(json!(settings.cost)));
     page.table(
         "transport",
         &format!(
-            "{method}, cost {distance}, order {order}: {}",
+            "{method}, cost {cost}, order {order}: {}",
             called(&report.order)
         ),
         [format!(
-            "mean cost {:.3} {unit} a slice, none more than {:.1e} above its dual bound",
+            "mean cost {:.3} a slice, none more than {:.1e} above its dual bound",
             report.mean_cost, report.largest_gap
         )],
     );

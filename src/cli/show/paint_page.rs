@@ -86,7 +86,7 @@ pub fn paint_page(file: &PaintFile) -> String {
             "gives back more light than it gets: the measurement may be uncalibrated"
         },
         [albedo
-            .map(|(angle, albedo)| format!("{angle}°: {albedo:.3}"))
+            .map(|(angle, albedo)| format!("{angle:.4}°: {albedo:.3}").replace(".0000°", "°"))
             .collect::<Vec<_>>()
             .join("   ")],
     );
@@ -111,7 +111,12 @@ fn short(values: &[f64; 3]) -> String {
 
 /// What the instrument that came with the measurement says of the same angle.
 fn against(file: &PaintFile, aspecular_deg: f64) -> String {
-    let mut rows = file.readings.iter().flat_map(|of| &of.rows);
+    // Only of the same light; the table's stands at 45°.
+    let of_this_light = file
+        .readings
+        .iter()
+        .filter(|of| of.illumination_deg == 45.0);
+    let mut rows = of_this_light.flat_map(|of| &of.rows);
     let row = rows.find(|row| row.aspecular_deg == aspecular_deg);
     row.map_or(String::new(), |row| {
         format!("   ΔE2000 to the lab's reading {:.2}", row.delta_e_2000)

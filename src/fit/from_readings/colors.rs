@@ -25,28 +25,37 @@ const APART_D_DEG: f64 = 4.0;
 /// Luminance of a curve that is none, 1/sr: there any color will do.
 const NOTHING: f64 = 1e-7;
 /// Largest factor on a curve, far above what its fit leaves.
-const MOST: f64 = 1e3;
+pub(super) const MOST_OF_CURVE: f64 = 1e3;
 /// CIEDE2000 by which a color may move into the gamut before that is told: what nobody sees.
 const UNSEEN: f64 = 0.1;
 
 /// A fitted table and what had to be done to it.
 pub(super) struct FittedColors {
     pub table: ColorTable,
-    /// Readings brought into the gamut.
-    pub mapped: usize,
+    /// Aspecular angles of readings that were brought into the gamut.
+    pub mapped: Vec<f64>,
+    /// Aspecular angles of readings that are more than [`MOST_OF_CURVE`] times the curve.
+    pub held: Vec<f64>,
 }
 
-/// Fits the color table that makes a curve read what was read.
-pub(super) fn fit_colors(reads: &[Read], curve: &Curve) -> FittedColors {
-    let mut mapped = 0;
+/// Fits the color table that makes a curve read what was read; `None` where none does.
+pub(super) fn fit_colors(reads: &[Read], curve: &Curve) -> Option<FittedColors> {
+    let (mut mapped, mut held) = (Vec::new(), Vec::new());
     let ratio = |read: &Read| -> LinearRgb {
         let (base, moved) = inside_gamut(read.base);
-        mapped += usize::from(moved > UNSEEN);
+        // What flakes outshine is black, which is told as that.
+        if moved > UNSEEN && read.below_zero == 0.0 {
+            mapped.push(read.aspecular_deg);
+        }
         let shape = curve.at(read);
         if shape < NOTHING {
             return [1.0; 3];
         }
-        base.map(|v| (v / shape).min(MOST))
+        let factors = base.map(|v| v / shape);
+        if factors.iter().any(|&v| v > MOST_OF_CURVE) {
+            held.push(read.aspecular_deg);
+        }
+        factors.map(|v| v.min(MOST_OF_CURVE))
     };
     let ratios: Vec<LinearRgb> = reads.iter().map(ratio).collect();
     let places: Vec<[f64; 2]> = reads
@@ -54,23 +63,25 @@ pub(super) fn fit_colors(reads: &[Read], curve: &Curve) -> FittedColors {
         .map(|r| [r.half.theta_h.to_degrees(), r.half.theta_d.to_degrees()])
         .collect();
     let [rows, columns] = grids(&places);
-    let nodes = nodes(&places, &ratios, &rows, &columns);
-    let lab = |rgb: &LinearRgb| Lab::from_rgb(rgb.map(|v| v.clamp(0.0, MOST)));
+    let nodes = nodes(&places, &ratios, &rows, &columns)?;
+    // Least squares may go a rounding below what was read.
+    let lab = |rgb: &LinearRgb| Lab::from_rgb(rgb.map(|v| v.clamp(0.0, MOST_OF_CURVE)));
     let labs = nodes.iter().map(lab).collect();
-    let table = ColorTable::new(rows, columns, labs, lab(&overall(&ratios)));
-    FittedColors {
-        table: table.unwrap_or_else(|_| ColorTable::white()),
+    let table = ColorTable::new(rows, columns, labs, lab(&overall(&ratios))).ok()?;
+    Some(FittedColors {
+        table,
         mapped,
-    }
+        held,
+    })
 }
 
-/// A color of which no channel is negative, and its CIEDE2000 to the one given: cut, or made grayer at its luminance,
-/// whichever is nearer.
+/// A color of which no channel is negative, and its CIEDE2000 to the one given: cut, or made grayer at its luminance
+/// (black where that is negative), whichever is nearer.
 pub(super) fn inside_gamut(rgb: LinearRgb) -> (LinearRgb, f64) {
     let least = rgb.iter().copied().fold(f64::INFINITY, f64::min);
     let gray = luminance(rgb);
-    if least >= 0.0 || gray <= 0.0 {
-        return (rgb.map(|v| v.max(0.0)), 0.0);
+    if least >= 0.0 {
+        return (rgb, 0.0);
     }
     let away = |other: LinearRgb| {
         let lab = |rgb: LinearRgb| Lab::from_rgb(rgb.map(|v| v * PI));
@@ -78,8 +89,12 @@ pub(super) fn inside_gamut(rgb: LinearRgb) -> (LinearRgb, f64) {
     };
     let cut = rgb.map(|v| v.max(0.0));
     // The share of gray at which the least channel is 0.
-    let share = least / (least - gray);
-    let grayer = rgb.map(|v| (v + share * (gray - v)).max(0.0));
+    let grayer = if gray > 0.0 {
+        let share = least / (least - gray);
+        rgb.map(|v| (v + share * (gray - v)).max(0.0))
+    } else {
+        [0.0; 3]
+    };
     if away(cut) < away(grayer) {
         (cut, away(cut))
     } else {
@@ -125,13 +140,13 @@ fn grids(places: &[[f64; 2]]) -> [AngleGrid; 2] {
     })
 }
 
-/// Colors of the nodes, θd fastest.
+/// Colors of the nodes, θd fastest; `None` where they do not follow from the readings.
 fn nodes(
     places: &[[f64; 2]],
     ratios: &[LinearRgb],
     rows: &AngleGrid,
     columns: &AngleGrid,
-) -> Vec<LinearRgb> {
+) -> Option<Vec<LinearRgb>> {
     let (width, count) = (columns.len(), rows.len() * columns.len());
     let mut matrix = vec![0.0; count * count];
     let mut data = vec![[0.0; 3]; count];
@@ -169,14 +184,9 @@ fn nodes(
         let data: Vec<f64> = data.iter().map(|rgb| rgb[k]).collect();
         damped_step(&data, |r, c| matrix[r * count + c], 0.0, 1e-12)
     };
-    let [Some(r), Some(g), Some(b)] = [channel(0), channel(1), channel(2)] else {
-        return vec![[1.0; 3]; count];
-    };
-    r.iter()
-        .zip(&g)
-        .zip(&b)
-        .map(|((&r, &g), &b)| [r, g, b])
-        .collect()
+    let (r, g, b) = (channel(0)?, channel(1)?, channel(2)?);
+    let colors = r.iter().zip(&g).zip(&b);
+    Some(colors.map(|((&r, &g), &b)| [r, g, b]).collect())
 }
 
 fn ends(bracket: Bracket) -> [(usize, f64); 2] {

@@ -9,7 +9,7 @@
 //! out. For given roughnesses the problem is linear; every choice of them is tried, so that there is no start to depend
 //! on and no local minimum. No lobe is narrower than the half angle that was read nearest to the mirror direction: at the
 //! mirror direction, which nobody saw, it is at most e times as bright as there. ρ grows as the square of 5 % and less,
-//! and linearly beyond, by reweighting.
+//! and linearly beyond, by reweighting. At last the whole is scaled so that it is too bright as often as too dark.
 //!
 //! Readings cannot tell F0 from a lobe's weight: under a coat Schlick's term adds a thousandth at most. It is fixed at that
 //! of aluminium, of which flakes are made. A smaller one would let the lobes of an uncoated paint grow towards grazing,
@@ -101,6 +101,7 @@ pub(super) fn fit_curve(reads: &[Read]) -> Curve {
             *weight = (1.0 + (error / ROBUST).powi(2)).powf(-0.25) / (y + BLACK);
         }
     }
+    let scale = middle_ratio(&rows, &found);
     let mut curve = Curve {
         diffuse: 0.0,
         lobes: Vec::new(),
@@ -108,14 +109,27 @@ pub(super) fn fit_curve(reads: &[Read]) -> Curve {
     };
     for (&column, &value) in found.columns.iter().zip(&found.values) {
         match column.checked_sub(1).and_then(|k| lobes.get(k)) {
-            None => curve.diffuse = value,
+            None => curve.diffuse = scale * value,
             Some(lobe) => curve.lobes.push(Lobe {
-                weight: [value; 3],
+                weight: [scale * value; 3],
                 ..*lobe
             }),
         }
     }
     curve
+}
+
+/// The middle one of what was read over what was found, which the color table must not have to make good: a relative
+/// error forgives a curve that is too dark more than one that is too bright.
+fn middle_ratio(rows: &[(Vec<f64>, f64)], found: &Choice) -> f64 {
+    let ratio = |(columns, y): &(Vec<f64>, f64)| (y + BLACK) / (found.value(columns) + BLACK);
+    let mut ratios: Vec<f64> = rows.iter().map(ratio).collect();
+    ratios.sort_by(f64::total_cmp);
+    let (low, high) = (ratios.len().saturating_sub(1) / 2, ratios.len() / 2);
+    match (ratios.get(low), ratios.get(high)) {
+        (Some(low), Some(high)) => (low * high).sqrt(),
+        _ => 1.0,
+    }
 }
 
 /// Half angles that are not nearly the same.

@@ -151,7 +151,7 @@ fn what_reflects_nothing_or_stands_below_the_paint_is_refused() {
     readings.rows[0][0] = -60.0;
     let fitted = fit(&readings, None);
     assert!(
-        fitted.warnings[0].starts_with("1 of 2 readings have their viewer"),
+        fitted.warnings[0].starts_with("1 of 2 readings were left out"),
         "{:?}",
         fitted.warnings
     );
@@ -177,7 +177,7 @@ fn a_color_outside_the_gamut_becomes_one_inside_and_is_counted() {
     readings.rows[0] = vec![45.0, 60.0, 120.0, 100.0];
     let fitted = fit(&readings, None);
     assert!(
-        fitted.warnings[0].starts_with("1 colors of the color table lay outside"),
+        fitted.warnings[0].starts_with("what was read at 45° lies outside sRGB"),
         "{:?}",
         fitted.warnings
     );
@@ -207,11 +207,73 @@ fn the_grids_steps_are_those_of_a_grid_however_near_the_readings() {
     assert!(apart(&fitted, &metallic(coat), &[45.0]) < 0.05);
 }
 
+#[test]
+fn a_reading_near_the_horizon_is_left_out_and_told() {
+    let coat = Some(Coat::smooth(1.5));
+    let good = read_on(&metallic(coat), &ASPECULAR_DEG);
+    let alone = fit(&good, coat);
+    for angle in [135.0, -45.0, 134.999, 131.0] {
+        let mut readings = good.clone();
+        readings.rows.push(vec![angle, 150.0, 0.0, 0.0]);
+        let fitted = fit(&readings, coat);
+        assert_eq!(fitted.paint, alone.paint, "{angle}");
+        let told = fitted
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("1 of 7 readings"));
+        assert!(told, "{:?}", fitted.warnings);
+    }
+    let light = MultiAngle {
+        illumination_deg: 89.0,
+        ..good
+    };
+    let refused = paint_from_readings(&light, coat, None);
+    assert!(
+        matches!(refused, Err(ReadingsFitError::NoViewer { .. })),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn numbers_that_mean_something_else_are_doubted() {
+    let read = |of: &dyn Fn(f64, f64) -> [f64; 3]| {
+        let mut readings = read_on(&metallic(None), &ASPECULAR_DEG);
+        for row in &mut readings.rows {
+            let [angle, l, a] = of(row[0], row[1]);
+            (row[0], row[1], row[2]) = (angle, l, a);
+        }
+        fit(&readings, None).warnings.join("; ")
+    };
+    assert!(!read(&|angle, l| [angle, l, 0.0]).contains("L goes up to 100"));
+    assert!(read(&|angle, l| [angle, l / 200.0, 0.0]).contains("L goes up to 100"));
+    assert!(read(&|angle, l| [angle, l.min(120.0) - 30.0, 0.0]).contains("L is negative"));
+    let reversed = read(&|angle, l| [95.0 - angle, l, 0.0]);
+    assert!(reversed.contains("angles reversed"), "{reversed}");
+    let twice = read(&|angle, l| [if angle == 75.0 { 15.0 } else { angle }, l, 0.0]);
+    assert!(twice.contains("contradict each other"), "{twice}");
+    let colored = read(&|angle, l| [angle, if angle == 45.0 { 0.0 } else { l }, 50.0]);
+    assert!(colored.contains("45° lies outside sRGB"), "{colored}");
+}
+
+#[test]
+fn two_readings_that_differ_much_are_both_met_without_a_wild_table() {
+    let mut readings = read_on(&metallic(None), &[15.0, 110.0]);
+    (readings.rows[0][1], readings.rows[1][1]) = (120.0, 10.0);
+    let fitted = fit(&readings, None).paint;
+    let most = fitted
+        .color_table
+        .nodes()
+        .iter()
+        .map(|lab| lab.l)
+        .fold(0.0, f64::max);
+    assert!(most < 400.0, "{most}");
+    assert!(against_readings(&fitted, &readings).expect("read").worst < 0.1);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
-    /// Whatever was read, the paint that comes of it is one, and reads the same if a paint can.
     #[test]
-    fn any_readings_make_a_valid_paint(
+    fn whatever_was_read_the_paint_that_comes_of_it_is_a_valid_one(
         lightness in prop::collection::vec(0.0..180.0_f64, 1..9),
         a in -40.0..40.0_f64, b in -40.0..40.0_f64,
         light in 0.0..80.0_f64, from in -60.0..20.0_f64, step in 0.0..25.0_f64, ior in 1.0..2.0_f64,
@@ -226,7 +288,7 @@ proptest! {
             fitted.paint.validate(&crate::paint::Limits::default()).expect("a paint");
             let reflectance = Reflectance::new(&fitted.paint);
             for angle in -80..160 {
-                let (wi, wo) = directions(45.0, f64::from(angle));
+                let (wi, wo) = directions(light, f64::from(angle));
                 prop_assert!(reflectance.evaluate(wi, wo, Chi::Table).iter().all(|f| f.is_finite() && *f >= 0.0));
             }
         }

@@ -4,6 +4,9 @@ use super::field::Field;
 use crate::measurement::package::PackageError;
 use crate::paint::{AngleGrid, Limits};
 
+/// Texels below this are finer than light's own waves, micrometres.
+const LEAST_TEXEL_UM: f64 = 0.3;
+
 /// The slices' pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::measurement) struct FlakesEntry {
@@ -100,6 +103,14 @@ pub(super) fn flakes(
     let theta_d = field
         .want("theta_i_deg", "a list of angles")?
         .angles(limits)?;
+    for (name, grid) in [("theta_h_deg", &theta_h), ("theta_i_deg", &theta_d)] {
+        let last = grid.degrees()[grid.len() - 1];
+        if grid.len() > 2 && last <= std::f64::consts::FRAC_PI_2 {
+            warnings.push(format!(
+                "flakes.{name} ends at {last}°: angles are in degrees; are these radians?"
+            ));
+        }
+    }
     let places = (0..theta_h.len()).flat_map(|h| (0..theta_d.len()).map(move |d| (h, d)));
     let mut names = std::collections::BTreeSet::new();
     for name in places.map(|(h, d)| pattern.name(h, d)) {
@@ -109,15 +120,19 @@ pub(super) fn flakes(
             ));
         }
     }
+    let accepted = "above 0, to 100000";
+    let texel_um = field.want("texel_um", accepted)?;
+    let texel_um = texel_um.number(f64::MIN_POSITIVE, 1e5, accepted)?;
+    if texel_um < LEAST_TEXEL_UM {
+        warnings.push(format!(
+            "flakes.texel_um is {texel_um}: no camera tells so little apart; are these millimetres?"
+        ));
+    }
     Ok(FlakesEntry {
         pattern,
         theta_h,
         theta_d,
-        texel_um: field.want("texel_um", "above 0, to 100000")?.number(
-            f64::MIN_POSITIVE,
-            1e5,
-            "above 0, to 100000",
-        )?,
+        texel_um,
         size: [width, height],
     })
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::measurement::archive::WORKBOOK;
 use crate::measurement::manifest::MANIFEST;
 use crate::measurement::picture::PictureError;
 use crate::paint::ColorTableError;
@@ -33,11 +34,12 @@ pub enum PackageError {
         accepted: usize,
     },
     /// A file that is not there.
-    #[error("{file} is not in the package{}", packed_with_folder(inside.as_deref()))]
+    #[error("{file} is not in the package{}", instead(inside.as_deref()))]
     Missing {
         /// Name in the package.
         file: String,
-        /// A file of this name inside a folder of the package.
+        /// A file of this name inside a folder of the package, one of this name in other case, or one that tells what the
+        /// archive is instead.
         inside: Option<String>,
     },
     /// A file that is too large, packed or unpacked.
@@ -137,10 +139,18 @@ impl PackageError {
     }
 }
 
-fn packed_with_folder(inside: Option<&str>) -> String {
-    inside.map_or_else(String::new, |inside| {
-        format!("; it holds {inside}: pack what is in the folder, not the folder itself")
-    })
+fn instead(inside: Option<&str>) -> String {
+    match inside {
+        None => String::new(),
+        Some(WORKBOOK) => {
+            "; it is the workbook of a spreadsheet: save the sheet of readings as CSV in UTF-8"
+                .to_owned()
+        }
+        Some(inside) if inside.contains('/') => {
+            format!("; it holds {inside}: pack what is in the folder, not the folder itself")
+        }
+        Some(inside) => format!("; it holds {inside}: names are told apart by case"),
+    }
 }
 
 #[cfg(test)]

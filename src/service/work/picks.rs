@@ -2,7 +2,7 @@
 //!
 //! To pick a profile takes a part of the work itself. Who asks for the same at the same time, or soon after, is answered
 //! with the same pick: a picture that is kept is not estimated again. What is remembered is forgotten after a while, for
-//! it depends on the machine and its load.
+//! it depends on the machine and its load; what a busy moment let fail is looked for again.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -87,15 +87,20 @@ impl App {
         pick: impl FnOnce() -> Result<Picked, Problem> + Send + 'static,
     ) -> Result<Picked, Problem> {
         let key = ids::key("pick", asked);
+        if let Some(known) = self.picks.0.get(&key).await {
+            return Ok((*known).clone().at_hand());
+        }
         let counter = &self.metrics.targets_searched;
         let search = async {
             let picked = self.bench.run(pick).await??;
             counter.increment(1);
             Ok(Arc::new(picked))
         };
-        match self.picks.0.try_get_with(key, search).await {
-            Ok(picked) => Ok((*picked).clone()),
-            Err(problem) => Err(Problem::clone(&problem)),
+        let found = self.picks.0.try_get_with(key, search).await;
+        let picked = (*found.map_err(|problem| Problem::clone(&problem))?).clone();
+        if !picked.met && picked.target.max_seconds.is_some() {
+            self.picks.0.invalidate(&key).await;
         }
+        Ok(picked)
     }
 }

@@ -20,7 +20,7 @@ use serde::Serialize;
 
 pub use blend::{estimate_blend, estimate_blend_of};
 pub use ingest::{estimate_ingest, sample_to_estimate};
-pub use preview::{PictureWork, estimate_preview};
+pub use preview::{PictureWork, SmallPictures, estimate_preview};
 pub use realise::estimate_realise;
 pub use work::Work;
 

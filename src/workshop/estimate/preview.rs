@@ -23,11 +23,9 @@ const LEAST_SHARE: f64 = 0.25;
 /// Samples per pixel from which on time is proportional to them.
 const ENOUGH: u32 = 8;
 
-/// A few small pictures: what each took, from which follows what a larger one will, with as many samples or more.
+/// A few small pictures: what each took, from which follows what a larger one will.
 #[derive(Clone, Debug)]
 pub struct SmallPictures {
-    samples_per_pixel: u32,
-    /// Work, seconds, pixels, bytes of each.
     drawn: Vec<SmallPicture>,
 }
 
@@ -45,18 +43,61 @@ fn batches(samples_per_pixel: u32) -> f64 {
 }
 
 impl SmallPictures {
-    /// Samples per pixel that pictures of so many are told by.
-    fn samples_for(samples_per_pixel: u32) -> u32 {
-        samples_per_pixel.min(2 * ENOUGH)
+    /// Draws the fewest that tell, once: who looks for a number of samples must not take longer than the picture.
+    ///
+    /// # Errors
+    ///
+    /// What [`preview`] refuses.
+    pub fn to_search(
+        work: &PictureWork<'_>,
+        samples_per_pixel: u32,
+    ) -> Result<Self, WorkshopError> {
+        let sides = &SEARCHING_SIDES;
+        Self::draw(work, samples_per_pixel, sides, |of| {
+            timed(|| work.draw(&of))
+        })
+    }
+
+    /// Seconds that the picture takes with so many samples per pixel.
+    #[must_use]
+    pub fn seconds(&self, work: &PictureWork<'_>, samples_per_pixel: u32) -> f64 {
+        self.tell(work.options.size, samples_per_pixel).0
+    }
+
+    /// What the picture takes, with an error that is known.
+    #[must_use]
+    pub fn estimate(&self, work: &PictureWork<'_>, profile: &Profile, error: f64) -> Estimate {
+        let options = work.with(profile.samples_per_pixel);
+        let (seconds, bytes) = self.tell(options.size, options.samples_per_pixel);
+        let mut stages = vec![Stage {
+            stage: "draw",
+            seconds,
+        }];
+        if work.written {
+            stages.push(Stage {
+                stage: "write",
+                seconds: write_seconds(bytes),
+            });
+        }
+        let error = EstimatedError {
+            value: Some(error),
+            unit: "CIEDE2000",
+        };
+        let drawn_with = Profile {
+            samples_per_pixel: options.samples_per_pixel,
+            ..*profile
+        };
+        Estimate::new(&drawn_with, stages, bytes, error)
     }
 
     /// Draws them at these numbers of pixels on the longer side; `time` says how often, and which go counts.
     fn draw(
-        options: &PreviewOptions,
+        work: &PictureWork<'_>,
         samples_per_pixel: u32,
         sides: &[u32],
         time: impl Fn(PreviewOptions) -> (f64, Result<Made, WorkshopError>),
     ) -> Result<Self, WorkshopError> {
+        let options = work.options;
         let longer = f64::from(options.size[0].max(options.size[1]));
         let mut drawn: Vec<SmallPicture> = Vec::new();
         for &side in sides {
@@ -70,8 +111,7 @@ impl SmallPictures {
             let size = (options.size).map(|n| ((f64::from(n) * scale).round() as u32).max(1));
             let (seconds, made) = time(PreviewOptions {
                 size,
-                samples_per_pixel,
-                ..options.clone()
+                ..work.with(samples_per_pixel)
             });
             let pixels = f64::from(size[0]) * f64::from(size[1]);
             drawn.push(SmallPicture {
@@ -81,10 +121,7 @@ impl SmallPictures {
                 bytes: made?.bytes.len() as f64,
             });
         }
-        Ok(Self {
-            samples_per_pixel,
-            drawn,
-        })
+        Ok(Self { drawn })
     }
 
     /// Seconds and bytes of a picture of this size.
@@ -124,10 +161,40 @@ pub struct PictureWork<'a> {
     pub written: bool,
 }
 
+impl PictureWork<'_> {
+    /// What it shows with so many samples per pixel; angles have none to choose.
+    fn with(&self, samples_per_pixel: u32) -> PreviewOptions {
+        PreviewOptions {
+            samples_per_pixel: if self.options.show.is_paint() {
+                samples_per_pixel
+            } else {
+                1
+            },
+            ..self.options.clone()
+        }
+    }
+
+    /// What so many samples per pixel leave to chance, CIEDE2000, mean over the pixels.
+    ///
+    /// # Errors
+    ///
+    /// What [`preview`] refuses.
+    pub fn error_of(&self, samples_per_pixel: u32) -> Result<f64, WorkshopError> {
+        if !self.options.show.is_paint() {
+            return Ok(0.0);
+        }
+        let options = self.with(samples_per_pixel);
+        let error = sampling(self.thing, self.weights, &options, self.limits)?;
+        Ok(error.mean_delta_e)
+    }
+
+    fn draw(&self, options: &PreviewOptions) -> Result<Made, WorkshopError> {
+        let (thing, weights) = (self.thing, self.weights);
+        preview(thing, weights, options, self.format, self.limits, &|_| ())
+    }
+}
+
 /// What drawing a picture will take; opening its paint not included.
-///
-/// `known` keeps the small pictures that tell it from one profile to the next: who looks through profiles draws each once,
-/// so as not to take longer than the picture itself.
 ///
 /// # Errors
 ///
@@ -135,59 +202,10 @@ pub struct PictureWork<'a> {
 pub fn estimate_preview(
     work: &PictureWork<'_>,
     profile: &Profile,
-    known: Option<&mut Option<SmallPictures>>,
 ) -> Result<Estimate, WorkshopError> {
-    let &PictureWork {
-        thing,
-        weights,
-        format,
-        limits,
-        written,
-        ..
-    } = work;
-    // Angles have no samples to choose, whatever the profile says.
-    let options = &PreviewOptions {
-        samples_per_pixel: if work.options.show.is_paint() {
-            profile.samples_per_pixel
-        } else {
-            1
-        },
-        ..work.options.clone()
-    };
-    let few = SmallPictures::samples_for(options.samples_per_pixel);
-    let draw = |of: PreviewOptions| preview(thing, weights, &of, format, limits, &|_| ());
-    let drawn = match known {
-        None => SmallPictures::draw(options, few, &SIDES, |of| shortest(|| draw(of.clone()))),
-        Some(Some(known)) if known.samples_per_pixel == few => Ok(known.clone()),
-        Some(known) => {
-            let sides = &SEARCHING_SIDES;
-            let drawn = SmallPictures::draw(options, few, sides, |of| timed(|| draw(of)))?;
-            Ok(known.insert(drawn).clone())
-        }
-    };
-    let (seconds, bytes) = drawn?.tell(options.size, options.samples_per_pixel);
-    let error = if options.show.is_paint() {
-        sampling(thing, weights, options, limits)?.mean_delta_e
-    } else {
-        0.0
-    };
-    let mut stages = vec![Stage {
-        stage: "draw",
-        seconds,
-    }];
-    if written {
-        stages.push(Stage {
-            stage: "write",
-            seconds: write_seconds(bytes),
-        });
-    }
-    let error = EstimatedError {
-        value: Some(error),
-        unit: "CIEDE2000",
-    };
-    let drawn_with = Profile {
-        samples_per_pixel: options.samples_per_pixel,
-        ..*profile
-    };
-    Ok(Estimate::new(&drawn_with, stages, bytes, error))
+    let samples = work.with(profile.samples_per_pixel).samples_per_pixel;
+    let few = samples.min(2 * ENOUGH);
+    let small = SmallPictures::draw(work, few, &SIDES, |of| shortest(|| work.draw(&of)))?;
+    let error = work.error_of(samples)?;
+    Ok(small.estimate(work, profile, error))
 }

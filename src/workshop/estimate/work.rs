@@ -67,7 +67,7 @@ impl Work<'_> {
                 format,
                 written,
             } => estimate_realise(thing, weights, format, profile, written),
-            Self::Preview(picture) => estimate_preview(&picture, profile, None),
+            Self::Preview(picture) => estimate_preview(&picture, profile),
         }
     }
 }

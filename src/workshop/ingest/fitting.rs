@@ -4,9 +4,7 @@ use super::IngestOptions;
 use super::measurement::BareMeasurement;
 use super::readings;
 use crate::accuracy::clustering_error;
-use crate::fit::{
-    CoatChoice, FittedBase, against_readings, fit_base, fit_base_telling, fit_flakes,
-};
+use crate::fit::{CoatChoice, FittedBase, fit_base, fit_base_telling, fit_flakes};
 use crate::measurement::{
     HalfAngleTable, Layout, Package, PackageBase, TableLayout, ThetaHSpacing, read_merl, read_mpi,
 };
@@ -145,7 +143,7 @@ pub(super) fn ingest_package(
     let against = package
         .multi_angle
         .as_ref()
-        .and_then(|readings| against_readings(&paint, readings));
+        .and_then(|readings| readings::compared(&paint, readings, &mut warnings));
     if package.multi_angle.is_some() && against.is_none() {
         warnings.push(
             "multi_angle holds no L, a, b and no usable spectrum at an angle above the surface: it was not compared with the \
@@ -163,13 +161,11 @@ pub(super) fn ingest_package(
 
 /// The coat of a package, of the index that the caller says where he says one.
 fn coat_of(package: &Package, options: &IngestOptions) -> Option<Coat> {
-    match (package.coat, options.coat_ior) {
-        (coat, None) => coat,
-        (coat, Some(ior)) => Some(Coat {
-            ior,
-            ..coat.unwrap_or(Coat::smooth(ior))
-        }),
-    }
+    let Some(ior) = options.coat_ior else {
+        return package.coat;
+    };
+    let of_index = readings::coat_of_index(ior)?;
+    Some(package.coat.map_or(of_index, |coat| Coat { ior, ..coat }))
 }
 
 /// Fits the table of a package inside its coat.
@@ -224,7 +220,8 @@ pub(in crate::workshop) fn finish(
     if !energy.conserves {
         let most = energy.albedo.iter().copied().fold(0.0, f64::max);
         warnings.push(format!(
-            "the paint reflects up to {most:.2} times the light it gets: the measurement may be uncalibrated"
+            "the paint reflects up to {most:.2} times the light it gets: the measurement may be uncalibrated, or what was \
+             not measured be guessed too bright"
         ));
     }
     PaintFile {
