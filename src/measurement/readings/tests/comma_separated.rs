@@ -125,7 +125,7 @@ fn a_table_that_is_wrong_is_refused_by_line_and_column() {
         assert!(found.contains(said), "{text:?}: {found}");
     }
     let long = format!("aspecular_deg,L,a,b\n{}", "15,50,0,0\n".repeat(257));
-    assert!(refused(Layout::Csv, &long).contains("182 readings, accepted are 1 to 256"));
+    assert!(refused(Layout::Csv, &long).contains("257 readings, accepted are 1 to 256"));
     let wide: Vec<u8> = TABLE.encode_utf16().flat_map(u16::to_le_bytes).collect();
     let wide = [b"\xff\xfe".to_vec(), wide].concat();
     let error = sniff(&wide, &ReadOptions::default())
