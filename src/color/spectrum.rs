@@ -17,12 +17,16 @@ use super::white::D65_2;
 
 /// Widest step between neighbouring values, nm.
 const WIDEST_STEP: f64 = 20.0;
+/// Least step, nm: a cubic through values that stand closer is one through their noise. What decimals of wavelengths were
+/// rounded by is let pass.
+const LEAST_STEP: f64 = 0.5;
+const ROUNDED: f64 = 1e-6;
 /// What every spectrum must cover, nm.
 const COVERED: (f64, f64) = (400.0, 700.0);
 /// Fewest values of a cubic.
 const CUBIC: usize = 4;
 
-/// A reflectance spectrum: wavelengths in nm, ascending, over all that eyes see well, at most 20 nm apart.
+/// A reflectance spectrum: wavelengths in nm, ascending, over all that eyes see well, 0.5 to 20 nm apart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wavelengths {
     /// For every wavelength of the tables: four neighbours from this one on, and the weight of each.
@@ -34,10 +38,8 @@ pub struct Wavelengths {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpectrumError {
-    /// Not ascending, or too far apart.
-    #[error(
-        "{after} nm follows {before} nm, accepted are wavelengths that ascend by 20 nm or less"
-    )]
+    /// Not ascending, too close or too far apart.
+    #[error("{after} nm follows {before} nm, accepted are wavelengths that ascend by 0.5 to 20 nm")]
     Step {
         /// A wavelength, nm.
         before: f64,
@@ -69,7 +71,7 @@ impl Wavelengths {
         );
         if let Some(&[before, after]) = nm.windows(2).find(|pair| {
             let step = pair[1] - pair[0];
-            !(step > 0.0 && step <= WIDEST_STEP)
+            !(LEAST_STEP - ROUNDED..=WIDEST_STEP + ROUNDED).contains(&step)
         }) {
             return Err(SpectrumError::Step { before, after });
         }
@@ -271,6 +273,12 @@ mod tests {
         let refused = |nm: &[f64]| Wavelengths::new(nm).expect_err("no spectrum").to_string();
         assert!(refused(&[400.0, 425.0, 700.0]).starts_with("425 nm follows 400 nm"));
         assert!(refused(&[400.0, 400.0]).starts_with("400 nm follows 400 nm"));
+        assert!(refused(&[400.0, 400.4, 410.0]).ends_with("ascend by 0.5 to 20 nm"));
+        let fine: Vec<f64> = (4000..=7000)
+            .step_by(5)
+            .map(|k| f64::from(k) / 10.0)
+            .collect();
+        assert!(Wavelengths::new(&fine).is_ok());
         let narrow: Vec<f64> = (42..=70).map(|k| f64::from(10 * k)).collect();
         assert!(refused(&narrow).starts_with("the spectrum goes from 420 to 700 nm"));
         assert!(Wavelengths::new(&[]).is_err() && Wavelengths::new(&[f64::NAN; 9]).is_err());

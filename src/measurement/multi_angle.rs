@@ -11,7 +11,7 @@ use crate::color::{
     D65_2, Illuminant, Lab, LinearRgb, Observer, SpectrumError, Wavelengths, WhitePoint, adapted,
     xyz_to_rgb,
 };
-use crate::paint::MAX_LAB;
+use crate::paint::{Limits, MAX_LAB};
 
 /// First column of all readings.
 pub const ASPECULAR_COLUMN: &str = "aspecular_deg";
@@ -20,6 +20,17 @@ pub const TEXTURE_COLUMNS: [&str; 3] = ["sparkle_intensity", "sparkle_area", "gr
 
 /// Reflectance factors of a spectrum; noise may be below 0.
 const SPECTRAL: (f64, f64) = (-1.0, 1000.0);
+/// Median of all factors above which they are taken for percent. Metallics reach it near the mirror, and there alone.
+const PERCENT: f64 = 5.0;
+/// Wavelengths that a column may name, nm.
+pub(super) const WAVELENGTHS_NM: std::ops::Range<f64> = 1.0..1e5;
+/// Readings of one paint that are accepted under any limits: as many as are written of one.
+const READINGS: usize = 256;
+
+/// Most readings of one paint.
+pub(super) fn most_readings(limits: &Limits) -> usize {
+    limits.angles.max(READINGS)
+}
 
 /// Readings of a portable multi-angle instrument, as they came.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +43,7 @@ pub struct MultiAngle {
     pub observer: Observer,
     /// Names of the columns; the first is `aspecular_deg`.
     pub columns: Vec<String>,
-    /// One number per column.
+    /// One number per column; of texture, which an instrument reads at some angles only, NaN where there was none.
     pub rows: Vec<Vec<f64>>,
 }
 
@@ -43,6 +54,8 @@ pub struct ReadColors {
     pub white: WhitePoint,
     /// Whether they hold for another observer than the 2°; their numbers are kept, since to convert them takes spectra.
     pub approximate: bool,
+    /// Why L, a, b were taken where there are spectral columns too.
+    pub warning: Option<String>,
     /// Aspecular angle in degrees, and what was read there, row by row.
     pub rows: Vec<(f64, Lab)>,
 }
@@ -68,6 +81,14 @@ pub enum ReadColorsError {
     /// Wavelengths that are no spectrum.
     #[error("spectral columns: {0}")]
     Spectrum(#[from] SpectrumError),
+    /// Spectra in percent.
+    #[error(
+        "the median of the spectral values is {median}, which looks like percent, accepted are factors, 1 is white"
+    )]
+    Percent {
+        /// The median.
+        median: f64,
+    },
     /// A value that no reading has.
     #[error("{column} at {aspecular_deg}° is {value}, accepted is {accepted}")]
     Value {
@@ -98,25 +119,40 @@ impl MultiAngle {
             && (has("L") && has("a") && has("b") || columns.iter().any(|c| c.starts_with("nm")))
     }
 
-    /// The colors that were read, of spectra where there are some.
+    /// The colors that were read, of spectra where there are usable ones.
     ///
     /// # Errors
     ///
     /// [`ReadColorsError`] naming the column and what would be accepted.
     pub fn colors(&self) -> Result<ReadColors, ReadColorsError> {
+        if !self.columns.iter().any(|column| column.starts_with("nm")) {
+            return self.lab_colors();
+        }
+        self.spectral_colors().or_else(|why| {
+            // Of what has no L, a, b either, the spectrum is what was meant.
+            let Ok(colors) = self.lab_colors() else {
+                return Err(why);
+            };
+            let warning = format!("L, a, b were taken, the spectra are not usable: {why}");
+            Ok(ReadColors {
+                warning: Some(warning),
+                ..colors
+            })
+        })
+    }
+
+    /// Place and wavelength of the spectral columns, ascending.
+    fn bands(&self) -> Result<Vec<(usize, f64)>, ReadColorsError> {
         let mut bands = Vec::new();
         for (at, column) in self.columns.iter().enumerate() {
             if let Some(nm) = column.strip_prefix("nm") {
-                let nm: Option<f64> = nm.parse().ok().filter(|nm| (1.0..1e5).contains(nm));
+                let nm: Option<f64> = nm.parse().ok().filter(|nm| WAVELENGTHS_NM.contains(nm));
                 let column = column.clone();
                 bands.push((at, nm.ok_or(ReadColorsError::Wavelength { column })?));
             }
         }
-        if bands.is_empty() {
-            self.lab_colors()
-        } else {
-            self.spectral_colors(bands)
-        }
+        bands.sort_by(|a, b| a.1.total_cmp(&b.1));
+        Ok(bands)
     }
 
     fn lab_colors(&self) -> Result<ReadColors, ReadColorsError> {
@@ -137,6 +173,7 @@ impl MultiAngle {
         Ok(ReadColors {
             white: WhitePoint::of(self.illuminant, Observer::Two),
             approximate: self.observer != Observer::Two,
+            warning: None,
             rows: self
                 .rows
                 .iter()
@@ -145,8 +182,8 @@ impl MultiAngle {
         })
     }
 
-    fn spectral_colors(&self, mut bands: Vec<(usize, f64)>) -> Result<ReadColors, ReadColorsError> {
-        bands.sort_by(|a, b| a.1.total_cmp(&b.1));
+    fn spectral_colors(&self) -> Result<ReadColors, ReadColorsError> {
+        let bands = self.bands()?;
         let nm: Vec<f64> = bands.iter().map(|band| band.1).collect();
         let wavelengths = Wavelengths::new(&nm)?;
         let accepted = "a reflectance factor from -1 to 1000; 1 is white";
@@ -160,14 +197,27 @@ impl MultiAngle {
                 Lab::from_xyz(wavelengths.xyz(&factors), D65_2),
             ))
         };
+        let rows = self
+            .rows
+            .iter()
+            .map(row)
+            .collect::<Result<_, ReadColorsError>>()?;
+        let all = self.rows.iter();
+        let mut all: Vec<f64> = all
+            .flat_map(|row| bands.iter().filter_map(|band| row.get(band.0).copied()))
+            .collect();
+        let middle = all.len() / 2;
+        if middle > 0 {
+            let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
+            if median > PERCENT {
+                return Err(ReadColorsError::Percent { median });
+            }
+        }
         Ok(ReadColors {
             white: D65_2,
             approximate: false,
-            rows: self
-                .rows
-                .iter()
-                .map(row)
-                .collect::<Result<_, ReadColorsError>>()?,
+            warning: None,
+            rows,
         })
     }
 
@@ -190,15 +240,20 @@ impl MultiAngle {
         })
     }
 
-    /// What was read of texture, angle by angle, by the name of its column.
+    /// What was read of texture, angle by angle, by the name of its column; nothing of a column in which nothing stands.
     #[must_use]
     pub fn texture_notes(&self) -> BTreeMap<String, String> {
         let mut notes = BTreeMap::new();
         for (at, column) in self.columns.iter().enumerate() {
             if TEXTURE_COLUMNS.contains(&column.as_str()) {
-                let at = |row: &Vec<f64>| row.get(at).map(|v| format!("{}°: {v}", angle_of(row)));
+                let at = |row: &Vec<f64>| {
+                    let value = row.get(at).filter(|value| value.is_finite())?;
+                    Some(format!("{}°: {value}", angle_of(row)))
+                };
                 let said: Vec<String> = self.rows.iter().filter_map(at).collect();
-                notes.insert(column.clone(), said.join(", "));
+                if !said.is_empty() {
+                    notes.insert(column.clone(), said.join(", "));
+                }
             }
         }
         notes
@@ -267,11 +322,62 @@ mod tests {
     }
 
     #[test]
+    fn a_spectrum_that_is_not_usable_leaves_lab_and_says_why() {
+        let warning_of = |columns: &[&str], row: &[f64]| {
+            let colors = readings(columns, row).colors().expect("colors");
+            assert!(colors.approximate && colors.rows[0].1.l == 50.0);
+            colors.warning.expect("a warning")
+        };
+        let mut columns = vec!["aspecular_deg", "L", "a", "b", "nm550"];
+        let mut row = vec![15.0, 50.0, 1.0, 2.0, 0.5];
+        assert!(warning_of(&columns, &row).contains("from 550 to 550 nm"));
+        columns[4] = "nmx";
+        assert!(warning_of(&columns, &row).contains("nmx names no wavelength"));
+        let bands: Vec<String> = (40..=70).map(|k| format!("nm{}", 10 * k)).collect();
+        columns.truncate(4);
+        columns.extend(bands.iter().map(String::as_str));
+        row.truncate(4);
+        row.extend([0.5; 31]);
+        row[10] = 1e5;
+        assert!(warning_of(&columns, &row).contains("nm460 at 15° is 100000"));
+    }
+
+    #[test]
+    fn percent_is_refused_and_a_bright_angle_is_not() {
+        let mut columns = vec!["aspecular_deg".to_owned()];
+        columns.extend((40..=70).map(|k| format!("nm{}", 10 * k)));
+        let of = |factors: &[f64]| {
+            let row = |(k, &factor): (usize, &f64)| {
+                let angle = std::iter::once(15.0 * (k + 1) as f64);
+                angle.chain([factor; 31]).collect()
+            };
+            let read = readings(&["aspecular_deg"], &[]);
+            let (columns, rows) = (
+                columns.clone(),
+                factors.iter().enumerate().map(row).collect(),
+            );
+            let read = MultiAngle {
+                columns,
+                rows,
+                ..read
+            };
+            read.colors()
+        };
+        assert!(of(&[40.0, 2.0, 0.3]).is_ok());
+        let text = of(&[60.0, 20.0, 3.0]).expect_err("percent").to_string();
+        assert!(
+            text.contains("is 20, which looks like percent") && text.contains("1 is white"),
+            "{text}"
+        );
+    }
+
+    #[test]
     fn texture_is_kept_angle_by_angle() {
         let notes = readings(
-            &["aspecular_deg", "L", "a", "b", "graininess"],
-            &[15.0, 1.0, 0.0, 0.0, 3.5],
+            &["aspecular_deg", "L", "a", "b", "graininess", "sparkle_area"],
+            &[15.0, 1.0, 0.0, 0.0, 3.5, f64::NAN],
         );
+        assert!(!notes.texture_notes().contains_key("sparkle_area"));
         assert_eq!(
             notes.texture_notes().get("graininess").map(String::as_str),
             Some("15°: 3.5")

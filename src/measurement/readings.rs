@@ -19,6 +19,8 @@ use crate::paint::Limits;
 const MOST_BYTES: u64 = 64 << 20;
 /// Characters of a value that an error repeats.
 const TOLD: usize = 60;
+/// Characters of a note.
+const NOTE_CHARACTERS: usize = 200;
 
 /// Readings of one paint, and what came with them.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,8 +68,8 @@ pub enum ReadingsError {
 }
 
 impl ReadingsFile {
-    /// Reads a file of readings. Of a document with several paints it takes the one that is called `wanted`, by its name
-    /// or its id.
+    /// Reads a file of readings. Of a document with several paints it takes the one that is called `wanted`, by its Id
+    /// or its name; of one with a single paint it takes that, unless `wanted` is another object of the document.
     ///
     /// # Errors
     ///
@@ -86,11 +88,16 @@ impl ReadingsFile {
             });
         }
         let text = text_of(bytes)?;
-        match layout {
-            Layout::Csv => Ok(read_csv(text, limits)?),
-            Layout::Cxf => Ok(read_cxf(text, wanted, limits)?),
-            found => Err(ReadingsError::Layout { found }),
-        }
+        let mut file = match layout {
+            Layout::Csv => read_csv(text, limits)?,
+            Layout::Cxf => read_cxf(text, wanted, limits)?,
+            found => return Err(ReadingsError::Layout { found }),
+        };
+        // What has no color at all is refused where its colors are wanted.
+        let colors = file.readings.colors().ok();
+        file.warnings
+            .extend(colors.and_then(|colors| colors.warning));
+        Ok(file)
     }
 }
 
@@ -102,13 +109,17 @@ pub(super) fn begins_as(bytes: &[u8]) -> Option<Layout> {
     if begin.trim_ascii_start().starts_with(b"<") {
         return holds(b"CxF").then_some(Layout::Cxf);
     }
-    let mut lines = begin.split(|b| *b == b'\n').map(<[u8]>::trim_ascii);
-    let header = lines.find(|line| !line.is_empty() && !comma_separated::is_remark(line))?;
-    let header = header.trim_ascii_start();
-    let header = header.strip_prefix(b"\"").unwrap_or(header);
-    header
-        .starts_with(super::multi_angle::ASPECULAR_COLUMN.as_bytes())
-        .then_some(Layout::Csv)
+    let mut lines = begin
+        .split(|b| matches!(b, b'\n' | b'\r'))
+        .map(<[u8]>::trim_ascii);
+    let first = lines.find(|line| !line.is_empty() && !comma_separated::is_remark(line))?;
+    let name = first.strip_prefix(b"\"").unwrap_or(first);
+    let column = super::multi_angle::ASPECULAR_COLUMN.as_bytes();
+    let is_named = name
+        .get(..column.len())
+        .is_some_and(|name| name.eq_ignore_ascii_case(column));
+    // A table without names is told that it lacks them.
+    (is_named || comma_separated::is_of_numbers(first)).then_some(Layout::Csv)
 }
 
 /// Byte order mark of UTF-8.
@@ -137,6 +148,11 @@ fn told(value: &str) -> String {
     } else {
         value.to_owned()
     }
+}
+
+/// The word for one of something, or for any other number of it.
+fn counted<'a>(count: usize, one: &'a str, many: &'a str) -> &'a str {
+    if count == 1 { one } else { many }
 }
 
 /// A name as a paint may have it, if the text is one.

@@ -2,9 +2,12 @@
 
 use super::field::Field;
 use crate::color::{Illuminant, Observer};
-use crate::measurement::multi_angle::MultiAngle;
+use crate::measurement::multi_angle::{MultiAngle, most_readings};
 use crate::measurement::package::PackageError;
 use crate::paint::Limits;
+
+/// Angles of light that are accepted: above the horizon.
+const LIGHT: &str = "degrees from 0 to below 90";
 
 pub(super) fn multi_angle(
     field: &Field,
@@ -38,7 +41,7 @@ pub(super) fn multi_angle(
     let mut rows = Vec::new();
     for row in field
         .want("rows", "a list of rows")?
-        .list(limits.angles, "rows")?
+        .list(most_readings(limits), "rows")?
     {
         let cells = row.list(columns.len(), "numbers")?;
         if cells.len() != columns.len() {
@@ -53,10 +56,12 @@ pub(super) fn multi_angle(
                 .collect::<Result<Vec<f64>, _>>()?,
         );
     }
-    Ok(MultiAngle {
-        illumination_deg: field
-            .want("illumination_deg", "0 to 90")?
-            .number(0.0, 90.0, "0 to 90")?,
+    let readings = MultiAngle {
+        illumination_deg: field.want("illumination_deg", LIGHT)?.number(
+            0.0,
+            90.0_f64.next_down(),
+            LIGHT,
+        )?,
         illuminant: match illuminant.text()? {
             "D65" => Illuminant::D65,
             "D50" => Illuminant::D50,
@@ -69,5 +74,9 @@ pub(super) fn multi_angle(
         },
         columns,
         rows,
-    })
+    };
+    // What has no color at all is refused where its colors are wanted.
+    let told = readings.colors().ok().and_then(|colors| colors.warning);
+    warnings.extend(told.map(|why| format!("multi_angle: {why}")));
+    Ok(readings)
 }

@@ -270,6 +270,14 @@ fn a_field_is_refused_by_path_value_and_what_is_accepted() {
 }
 
 #[test]
+fn readings_need_light_from_above_the_horizon() {
+    let text = refusal("/multi_angle/illumination_deg", json!(90));
+    let wanted =
+        "paint.json: multi_angle.illumination_deg is 90, accepted is degrees from 0 to below 90";
+    assert_eq!(text, wanted);
+}
+
+#[test]
 fn a_column_named_twice_is_refused() {
     let columns = json!(["aspecular_deg", "L", "a", "b", "L"]);
     let text = refusal("/multi_angle/columns", columns);

@@ -9,93 +9,24 @@
 //!
 //! Columns are those of a package's `multi_angle`: `aspecular_deg` first, then L, a, b or `nm400` … `nm700`, in any order.
 //! They are separated by commas, semicolons or tabs, whichever the line of names has; where it is not commas, decimals may
-//! have them. Lines that begin with `#` say what a table cannot.
+//! have them. Lines that begin with `#` say what a table cannot, wherever they stand. Cells of texture may be empty.
 
-use std::collections::BTreeMap;
+mod error;
+mod remarks;
 
-use super::{ReadingsFile, as_name, told};
+pub use self::error::CsvError;
+use self::remarks::Remarks;
+use super::{ReadingsFile, counted, told};
 use crate::color::{Illuminant, Observer};
 use crate::measurement::MultiAngle;
-use crate::measurement::multi_angle::{ASPECULAR_COLUMN, TEXTURE_COLUMNS};
+use crate::measurement::multi_angle::{ASPECULAR_COLUMN, TEXTURE_COLUMNS, most_readings};
 use crate::paint::Limits;
 
 /// Columns of a table, and of those columns that are not read how many are told.
 const MOST_COLUMNS: usize = 1000;
 const UNKNOWN_TOLD: usize = 8;
-/// Characters of a note.
-const NOTE_CHARACTERS: usize = 200;
-/// What a remark may say beside light, observer, angle and name.
-const NOTES: [&str; 5] = [
-    "license",
-    "instrument",
-    "maker",
-    "color_code",
-    "measured_on",
-];
-const ACCEPTED_COLUMNS: &str =
-    "aspecular_deg first, then L, a, b or spectral columns nm400 to nm700, each once";
-
-/// Why a table holds no readings.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CsvError {
-    /// A line of column names that are not those of readings, or none.
-    #[error("line {line} names the columns {found}, accepted are {ACCEPTED_COLUMNS}")]
-    Columns {
-        /// Number of the line.
-        line: u64,
-        /// What it says.
-        found: String,
-    },
-    /// A line that has not one value for each column.
-    #[error(
-        "line {line} has {found} values, accepted are {columns}, one for each column; where decimals have commas, \
-         semicolons or tabs stand between columns"
-    )]
-    Values {
-        /// Number of the line.
-        line: u64,
-        /// How many values it has.
-        found: usize,
-        /// How many columns there are.
-        columns: usize,
-    },
-    /// A value that no column of that name has.
-    #[error("line {line}, column {column}: the value is {value:?}, accepted is {accepted}")]
-    Value {
-        /// Number of the line.
-        line: u64,
-        /// Name of the column.
-        column: String,
-        /// What stands there.
-        value: String,
-        /// What may stand there.
-        accepted: &'static str,
-    },
-    /// A remark that says what cannot be.
-    #[error("line {line}: {key} is {value:?}, accepted is {accepted}")]
-    Remark {
-        /// Number of the line.
-        line: u64,
-        /// What it is about.
-        key: String,
-        /// What it says.
-        value: String,
-        /// What it may say.
-        accepted: &'static str,
-    },
-    /// Too many lines, or none.
-    #[error("{found} readings, accepted are 1 to {accepted}")]
-    Rows {
-        /// How many there are, at least.
-        found: usize,
-        /// The limit.
-        accepted: usize,
-    },
-    /// What the table's reader refuses.
-    #[error("{0}")]
-    Table(String),
-}
+/// Bytes of one line.
+const LINE_BYTES: usize = 64 << 10;
 
 /// Whether a line says what a table cannot, in place of being one of the table's.
 pub(super) fn is_remark(line: &[u8]) -> bool {
@@ -106,32 +37,19 @@ pub(super) fn is_remark(line: &[u8]) -> bool {
         .starts_with(b"#")
 }
 
-/// What the remarks of a table say.
-#[derive(Default)]
-struct Remarks {
-    name: Option<String>,
-    notes: BTreeMap<String, String>,
-    illumination_deg: Option<f64>,
-    illuminant: Option<Illuminant>,
-    observer: Option<Observer>,
-    warnings: Vec<String>,
+/// Whether a line is one of numbers, as a table without names begins.
+pub(super) fn is_of_numbers(line: &[u8]) -> bool {
+    let separators = line.iter().filter(|b| matches!(b, b',' | b';' | b'\t'));
+    let of_numbers = |b: &u8| b.is_ascii_digit() || b" \",;\t.+-eE".contains(b);
+    separators.count() >= 3
+        && line.iter().any(u8::is_ascii_digit)
+        && line.len() < 4000
+        && line.iter().all(of_numbers)
 }
 
 pub(super) fn read_csv(text: &str, limits: &Limits) -> Result<ReadingsFile, CsvError> {
     let mut remarks = Remarks::default();
-    let (mut before, mut body) = (0_u64, text);
-    while let Some((line, rest)) = body
-        .split_once('\n')
-        .or((!body.is_empty()).then_some((body, "")))
-    {
-        if is_remark(line.as_bytes()) {
-            remarks.read(line, before + 1)?;
-        } else if !line.trim().is_empty() {
-            break;
-        }
-        (before, body) = (before + 1, rest);
-    }
-    let (columns, rows) = table(body, before, limits, &mut remarks.warnings)?;
+    let (columns, rows) = table(text, limits, &mut remarks)?;
     let unsaid = [
         (
             "illumination_deg",
@@ -176,171 +94,200 @@ pub(super) fn read_csv(text: &str, limits: &Limits) -> Result<ReadingsFile, CsvE
     })
 }
 
-impl Remarks {
-    fn read(&mut self, text: &str, line: u64) -> Result<(), CsvError> {
-        // A spreadsheet fills such a line up with separators, and may quote it.
-        let text = text
-            .trim()
-            .trim_end_matches([',', ';', '\t'])
-            .trim_matches('"');
-        let Some((key, value)) = text.trim_start_matches(['#', ' ']).split_once(':') else {
-            return Ok(());
+/// Lines with their numbers, whichever way they end.
+fn lines(text: &str) -> impl Iterator<Item = (u64, &str)> {
+    let mut rest = Some(text);
+    let lines = std::iter::from_fn(move || {
+        let text = rest.filter(|text| !text.is_empty())?;
+        let Some((line, after)) = text.split_once(['\n', '\r']) else {
+            return rest.take();
         };
-        let (key, value) = (key.trim(), value.trim());
-        let refuse = |accepted: &'static str| CsvError::Remark {
-            line,
-            key: told(key),
-            value: told(value),
-            accepted,
-        };
-        match key {
-            "name" => {
-                let name = as_name(value);
-                self.name = Some(name.ok_or_else(|| refuse("1 to 200 printable characters"))?);
-            }
-            "illuminant" => {
-                self.illuminant = Some(match value {
-                    "D65" => Illuminant::D65,
-                    "D50" => Illuminant::D50,
-                    _ => return Err(refuse("D65 or D50")),
-                });
-            }
-            "observer" => {
-                self.observer = Some(match value.trim_end_matches('°') {
-                    "2" => Observer::Two,
-                    "10" => Observer::Ten,
-                    _ => return Err(refuse("2 or 10")),
-                });
-            }
-            "illumination_deg" => {
-                let angle = value.parse().ok().filter(|v| (0.0..90.0).contains(v));
-                self.illumination_deg =
-                    Some(angle.ok_or_else(|| {
-                        refuse("degrees from 0 to below 90, with a decimal point")
-                    })?);
-            }
-            key if NOTES.contains(&key) => {
-                if value.chars().count() > NOTE_CHARACTERS || value.chars().any(char::is_control) {
-                    return Err(refuse("up to 200 printable characters"));
-                }
-                self.notes.insert(key.to_owned(), value.to_owned());
-            }
-            _ if self.warnings.len() < UNKNOWN_TOLD => self.warnings.push(format!(
-                "line {line}: {:?} is nothing that a table of readings says, and was not read",
-                told(key)
-            )),
-            _ => {}
-        }
-        Ok(())
-    }
+        let is_pair = text.as_bytes()[line.len()] == b'\r' && after.starts_with('\n');
+        rest = Some(&after[usize::from(is_pair)..]);
+        Some(line)
+    });
+    (1..).zip(lines)
+}
+
+/// The columns of a table that are read.
+struct Head {
+    separator: char,
+    /// How many columns the table has.
+    width: usize,
+    /// Place and name of those that are read.
+    columns: Vec<(usize, String)>,
 }
 
 /// Names of the columns that are read, and a row for each line.
 fn table(
-    body: &str,
-    before: u64,
+    text: &str,
     limits: &Limits,
-    warnings: &mut Vec<String>,
+    remarks: &mut Remarks,
 ) -> Result<(Vec<String>, Vec<Vec<f64>>), CsvError> {
-    let head = body.lines().next().unwrap_or_default();
-    let separator = [b';', b'\t']
-        .into_iter()
-        .find(|s| head.as_bytes().contains(s))
-        .unwrap_or(b',');
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(separator)
-        .has_headers(false)
-        .flexible(true)
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(body.as_bytes());
-    let mut records = reader.records();
-    let broken = |error: csv::Error| CsvError::Table(error.to_string());
-    let line_of =
-        |record: &csv::StringRecord| before + record.position().map_or(1, csv::Position::line);
-    let names = records
-        .next()
-        .transpose()
-        .map_err(broken)?
-        .unwrap_or_default();
-    let line = line_of(&names);
+    let accepted = most_readings(limits);
+    let (mut head, mut rows): (Option<Head>, Vec<Vec<f64>>) = (None, Vec::new());
+    for (line, text) in lines(text) {
+        let is_remark = is_remark(text.as_bytes());
+        // A spreadsheet leaves lines of separators below a table.
+        let is_empty = text
+            .chars()
+            .all(|c| c.is_whitespace() || matches!(c, ',' | ';' | '"'));
+        if is_empty && !is_remark {
+            continue;
+        }
+        if text.len() > LINE_BYTES {
+            return Err(CsvError::Line {
+                line,
+                bytes: text.len(),
+                accepted: LINE_BYTES,
+            });
+        }
+        if is_remark {
+            remarks.read(text, line)?;
+        } else if let Some(head) = &head {
+            if rows.len() == accepted {
+                let found = accepted + 1;
+                return Err(CsvError::Rows { found, accepted });
+            }
+            rows.push(row(text, line, head)?);
+        } else {
+            head = Some(head_of(text, line, &mut remarks.warnings)?);
+        }
+    }
+    let Some(head) = head else {
+        let found = "\"\"".to_owned();
+        return Err(CsvError::Columns { line: 1, found });
+    };
+    if rows.is_empty() {
+        return Err(CsvError::Rows { found: 0, accepted });
+    }
+    let names = head.columns.into_iter().map(|column| column.1).collect();
+    Ok((names, rows))
+}
+
+/// The columns that a line names.
+fn head_of(text: &str, line: u64, warnings: &mut Vec<String>) -> Result<Head, CsvError> {
+    if is_of_numbers(text.as_bytes()) {
+        let found = format!("{:?}", told(text.trim()));
+        return Err(CsvError::Unnamed { line, found });
+    }
+    let separator = [';', '\t'].into_iter().find(|s| text.contains(*s));
+    let separator = separator.unwrap_or(',');
+    let refuse = |names: &str| CsvError::Columns {
+        line,
+        found: format!("{:?}", told(names)),
+    };
+    if text.matches(separator).count() >= MOST_COLUMNS {
+        return Err(refuse(text));
+    }
+    let names = cells(text, line, separator)?;
     let mut columns: Vec<(usize, String)> = Vec::new();
     let mut unknown = Vec::new();
-    for (at, name) in names.iter().enumerate().take(MOST_COLUMNS) {
-        let known = [ASPECULAR_COLUMN, "L", "a", "b"].contains(&name)
-            || TEXTURE_COLUMNS.contains(&name)
-            || name.starts_with("nm");
-        if known {
-            columns.push((at, name.to_owned()));
-        } else {
-            unknown.push(format!("{:?}", told(name)));
+    for (at, name) in names.iter().enumerate() {
+        match known(name, &names) {
+            Some(name) => columns.push((at, name)),
+            None => unknown.push(format!("{:?}", told(name))),
         }
     }
     let kept: Vec<String> = columns.iter().map(|column| column.1.clone()).collect();
     let mut sorted = kept.clone();
     sorted.sort();
     let twice = sorted.windows(2).any(|pair| pair[0] == pair[1]);
-    if names.len() > MOST_COLUMNS || twice || !MultiAngle::are_readings(&kept) || columns[0].0 != 0
-    {
+    let first = columns.first().map(|column| column.0);
+    if twice || !MultiAngle::are_readings(&kept) || first != Some(0) {
         let found: Vec<&str> = names.iter().take(UNKNOWN_TOLD).collect();
-        let found = format!("{:?}", told(&found.join(", ")));
-        return Err(CsvError::Columns { line, found });
+        return Err(refuse(&found.join(", ")));
     }
     if !unknown.is_empty() {
+        let count = unknown.len();
+        unknown.truncate(UNKNOWN_TOLD);
         warnings.push(format!(
-            "line {line}: {} of the columns are none of readings and were not read: {}",
-            unknown.len(),
-            unknown
-                .iter()
-                .take(UNKNOWN_TOLD)
-                .cloned()
-                .collect::<Vec<_>>()
-                .join(", ")
+            "line {line}: {count} of the columns {} not read: {}",
+            counted(
+                count,
+                "is none of readings and was",
+                "are none of readings and were"
+            ),
+            unknown.join(", ")
         ));
     }
-    let mut rows = Vec::new();
-    for record in records {
-        let record = record.map_err(broken)?;
-        let line = line_of(&record);
-        // A spreadsheet leaves lines of separators below a table.
-        if record.iter().all(str::is_empty) {
-            continue;
-        }
-        if record.len() != names.len() {
-            return Err(CsvError::Values {
-                line,
-                found: record.len(),
-                columns: names.len(),
-            });
-        }
-        if rows.len() == limits.angles {
-            return Err(CsvError::Rows {
-                found: rows.len() + 1,
-                accepted: limits.angles,
-            });
-        }
-        let cell = |(at, column): &(usize, String)| {
-            number(
-                record.get(*at).unwrap_or_default(),
-                separator != b',',
-                column,
-            )
-            .map_err(|accepted| CsvError::Value {
-                line,
-                column: column.clone(),
-                value: told(record.get(*at).unwrap_or_default()),
-                accepted,
-            })
-        };
-        rows.push(columns.iter().map(cell).collect::<Result<Vec<f64>, _>>()?);
+    Ok(Head {
+        separator,
+        width: names.len(),
+        columns,
+    })
+}
+
+/// The column of readings that a name is, in whichever case its letters are where no other column has them right.
+fn known(name: &str, all: &csv::StringRecord) -> Option<String> {
+    let exact = [ASPECULAR_COLUMN, "L", "a", "b"];
+    if name.starts_with("nm") {
+        return Some(name.to_owned());
     }
-    if rows.is_empty() {
-        return Err(CsvError::Rows {
-            found: 0,
-            accepted: limits.angles,
-        });
+    let is_of_nm = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit());
+    if let Some(rest) = ["NM", "Nm", "nM"]
+        .iter()
+        .find_map(|nm| name.strip_prefix(nm))
+        && is_of_nm(rest)
+    {
+        return Some(format!("nm{rest}"));
     }
-    Ok((kept, rows))
+    let mut columns = exact.into_iter().chain(TEXTURE_COLUMNS);
+    let column = columns.find(|column| column.eq_ignore_ascii_case(name))?;
+    (column == name || !all.iter().any(|other| other == column)).then(|| column.to_owned())
+}
+
+/// The cells of a line.
+fn cells(text: &str, line: u64, separator: char) -> Result<csv::StringRecord, CsvError> {
+    if text.matches('"').count() % 2 == 1 {
+        return Err(CsvError::Quotes { line });
+    }
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(if separator == ';' {
+            b';'
+        } else if separator == '\t' {
+            b'\t'
+        } else {
+            b','
+        })
+        .has_headers(false)
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let record = reader.records().next().transpose();
+    Ok(record
+        .map_err(|error| CsvError::Table(error.to_string()))?
+        .unwrap_or_default())
+}
+
+/// The numbers of a line.
+fn row(text: &str, line: u64, head: &Head) -> Result<Vec<f64>, CsvError> {
+    let columns = head.width;
+    let refuse = |found| CsvError::Values {
+        line,
+        found,
+        columns,
+    };
+    let separators = text.matches(head.separator).count();
+    if separators >= MOST_COLUMNS {
+        return Err(refuse(separators + 1));
+    }
+    let cells = cells(text, line, head.separator)?;
+    if cells.len() != columns {
+        return Err(refuse(cells.len()));
+    }
+    let cell = |(at, column): &(usize, String)| {
+        let cell = cells.get(*at).unwrap_or_default();
+        if cell.is_empty() && TEXTURE_COLUMNS.contains(&column.as_str()) {
+            return Ok(f64::NAN);
+        }
+        number(cell, head.separator != ',', column).map_err(|accepted| CsvError::Value {
+            line,
+            column: column.clone(),
+            value: told(cell),
+            accepted,
+        })
+    };
+    head.columns.iter().map(cell).collect()
 }
 
 /// The number that a cell of a column holds, or what it should.

@@ -19,12 +19,25 @@ const DEPTH: usize = 64;
 /// Elements of a document, and bytes of one tag.
 const ELEMENTS: usize = 200_000;
 const TAG_BYTES: usize = 64 << 10;
+/// Attributes that are read; no other is kept.
+const ATTRIBUTES: [&str; 8] = [
+    "Id",
+    "Name",
+    "ObjectType",
+    "ColorSpecification",
+    "Notation",
+    "StartWL",
+    "Increment",
+    "WL",
+];
+/// Encodings whose text is UTF-8.
+const ENCODINGS: [&str; 3] = ["UTF-8", "UTF8", "US-ASCII"];
 
 /// An element: its name without prefix, what it says and what is in it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Element {
     pub name: String,
-    attributes: Vec<(String, String)>,
+    attributes: Vec<(&'static str, String)>,
     pub text: String,
     pub children: Vec<Element>,
 }
@@ -33,7 +46,7 @@ impl Element {
     pub fn attribute(&self, name: &str) -> Option<&str> {
         let mut attributes = self.attributes.iter();
         attributes
-            .find(|(own, _)| own == name)
+            .find(|(own, _)| *own == name)
             .map(|(_, value)| value.trim())
     }
 
@@ -100,9 +113,21 @@ pub(super) fn read_document(text: &str) -> Result<Element, CxfError> {
             }
             Event::End(_) if foreign > 0 => foreign -= 1,
             Event::End(_) => close(&mut open, &mut root),
-            Event::Text(piece) => write(&mut open, foreign, &piece.xml10_content()),
+            Event::Text(piece) => {
+                let text = piece.xml10_content();
+                if open.is_empty() && !text.trim().is_empty() {
+                    return Err(wrong(&outside(text.trim())));
+                }
+                write(&mut open, foreign, &text);
+            }
+            Event::CData(piece) if open.is_empty() => {
+                return Err(wrong(&outside(&piece.xml10_content())));
+            }
             Event::CData(piece) => write(&mut open, foreign, &piece.xml10_content()),
             Event::GeneralRef(entity) => {
+                if open.is_empty() {
+                    return Err(wrong(&outside(&format!("&{};", entity.into_inner()))));
+                }
                 let character = entity.resolve_char_ref().map_err(|e| wrong(&e))?;
                 let name = entity.into_inner();
                 match (character, resolve_predefined_entity(&name)) {
@@ -112,7 +137,17 @@ pub(super) fn read_document(text: &str) -> Result<Element, CxfError> {
                 }
             }
             Event::DocType(_) => return Err(CxfError::DocumentType),
-            Event::Comment(_) | Event::Decl(_) | Event::PI(_) => {}
+            Event::Decl(declaration) => {
+                if let Some(encoding) = declaration.encoding() {
+                    let encoding = encoding.map_err(|e| wrong(&e))?;
+                    let mut ours = ENCODINGS.iter();
+                    if !ours.any(|own| own.eq_ignore_ascii_case(&encoding)) {
+                        let found = told(&encoding);
+                        return Err(CxfError::Encoding { found });
+                    }
+                }
+            }
+            Event::Comment(_) | Event::PI(_) => {}
             Event::Eof => break,
         }
     }
@@ -133,18 +168,36 @@ fn element(tag: &BytesStart) -> Result<Element, String> {
         ));
     }
     let mut attributes = Vec::new();
-    for attribute in tag.attributes() {
+    // Which attributes stand twice is looked for among those that are kept: of all it takes the square of their number.
+    for attribute in tag.attributes().with_checks(false) {
         let attribute = attribute.map_err(|e| e.to_string())?;
+        let own = attribute.key.into_inner();
+        let Some(key) = ATTRIBUTES.into_iter().find(|key| *key == own) else {
+            continue;
+        };
+        if attributes.iter().any(|(other, _)| *other == key) {
+            return Err(format!(
+                "the attribute {key} stands twice in a tag, accepted is once"
+            ));
+        }
         let value = attribute
             .normalized_value(XmlVersion::Implicit1_0)
             .map_err(|e| e.to_string())?;
-        attributes.push((attribute.key.into_inner().to_owned(), value.into_owned()));
+        attributes.push((key, value.into_owned()));
     }
     Ok(Element {
         name: tag.local_name().into_inner().to_owned(),
         attributes,
         ..Element::default()
     })
+}
+
+/// Why text cannot stand before or after the root.
+fn outside(text: &str) -> String {
+    format!(
+        "the text {:?} stands outside the root element, accepted is nothing there but space and comments",
+        told(text)
+    )
 }
 
 /// Ends the element begun last.

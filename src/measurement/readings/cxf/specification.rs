@@ -1,8 +1,12 @@
 //! What a `ColorSpecification` of `CxF3` says: light, observer, geometry, wavelengths, instrument.
 
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
 use super::document::Element;
 use crate::color::{Illuminant, Observer};
-use crate::measurement::readings::told;
+use crate::measurement::multi_angle::WAVELENGTHS_NM;
+use crate::measurement::readings::{NOTE_CHARACTERS, told};
 
 /// Most angles of one specification.
 const MOST_ANGLES: usize = 256;
@@ -14,91 +18,138 @@ pub(super) struct Angles {
     pub aspecular_deg: f64,
 }
 
-/// A specification that values of objects refer to.
-pub(super) struct Specification<'a>(pub &'a Element);
-
-impl<'a> Specification<'a> {
-    pub fn id(&self) -> &'a str {
-        self.0.attribute("Id").unwrap_or_default()
-    }
-
-    /// Light that L, a, b hold for, or why it cannot be used.
-    pub fn illuminant(&self) -> Result<Illuminant, String> {
-        match self
-            .0
-            .at(&["TristimulusSpec"])
-            .and_then(|spec| spec.said("Illuminant"))
-        {
-            Some("D65") => Ok(Illuminant::D65),
-            Some("D50") => Ok(Illuminant::D50),
-            other => Err(format!(
-                "its illuminant is {}, accepted are D65 and D50",
-                or_missing(other)
-            )),
-        }
-    }
-
-    /// Observer that L, a, b hold for, or why it cannot be used.
-    pub fn observer(&self) -> Result<Observer, String> {
-        match self
-            .0
-            .at(&["TristimulusSpec"])
-            .and_then(|spec| spec.said("Observer"))
-        {
-            Some("2_Degree") => Ok(Observer::Two),
-            Some("10_Degree") => Ok(Observer::Ten),
-            other => Err(format!(
-                "its observer is {}, accepted are 2_Degree and 10_Degree",
-                or_missing(other)
-            )),
-        }
-    }
-
+/// A specification that values of objects refer to, read once; of each part what it says, or why it cannot be used.
+pub(super) struct Specification {
+    /// Light that L, a, b hold for.
+    pub illuminant: Result<Illuminant, String>,
+    /// Observer that L, a, b hold for.
+    pub observer: Result<Observer, String>,
     /// First wavelength and step of spectra, nm.
-    pub fn wavelengths(&self) -> Option<(f64, f64)> {
-        let range = self.0.at(&["MeasurementSpec", "WavelengthRange"])?;
-        let number = |name| range.attribute(name)?.parse().ok();
-        Some((number("StartWL")?, number("Increment")?))
-    }
-
+    pub wavelengths: Result<(f64, f64), String>,
     /// Maker, model and serial number of the instrument.
-    pub fn instrument(&self) -> Option<String> {
-        let device = self.0.at(&["MeasurementSpec", "Device"])?;
-        let said: Vec<&str> = ["Manufacturer", "Model", "SerialNumber"]
-            .iter()
-            .filter_map(|name| device.said(name))
-            .collect();
-        (!said.is_empty()).then(|| said.join(" "))
+    pub instrument: Option<Rc<str>>,
+    geometry: Result<Geometry, String>,
+}
+
+/// Angles at which values are read.
+enum Geometry {
+    One(Angles),
+    /// Several by their notation, and how many they are.
+    Several(BTreeMap<String, Result<Angles, String>>, usize),
+}
+
+impl Specification {
+    pub fn read(of: &Element) -> Self {
+        let color = of.child("TristimulusSpec");
+        let measured = of.child("MeasurementSpec");
+        Self {
+            illuminant: match color.and_then(|spec| spec.said("Illuminant")) {
+                Some("D65") => Ok(Illuminant::D65),
+                Some("D50") => Ok(Illuminant::D50),
+                other => Err(format!(
+                    "its illuminant is {}, accepted are D65 and D50",
+                    or_missing(other)
+                )),
+            },
+            observer: match color.and_then(|spec| spec.said("Observer")) {
+                Some("2_Degree") => Ok(Observer::Two),
+                Some("10_Degree") => Ok(Observer::Ten),
+                other => Err(format!(
+                    "its observer is {}, accepted are 2_Degree and 10_Degree",
+                    or_missing(other)
+                )),
+            },
+            wavelengths: wavelengths(measured),
+            instrument: measured.and_then(instrument),
+            geometry: geometry(measured),
+        }
     }
 
     /// Angles at which the value of this name was read, or why it cannot be used. Of a specification that lists several,
     /// a value names one by its notation.
     pub fn angles(&self, value: Option<&str>) -> Result<Angles, String> {
-        let measured = self.0.child("MeasurementSpec");
-        let kind = measured.and_then(|spec| spec.said("MeasurementType"));
-        if !kind
-            .is_some_and(|kind| matches!(kind, "Spectrum_Reflectance" | "Colorimetric_Reflectance"))
-        {
-            return Err(format!(
-                "its measurement is {}, accepted are Spectrum_Reflectance and Colorimetric_Reflectance",
-                or_missing(kind)
-            ));
+        match self.geometry.as_ref().map_err(Clone::clone)? {
+            Geometry::One(angles) => Ok(*angles),
+            Geometry::Several(named, count) => {
+                let chosen = value.and_then(|value| named.get(value));
+                chosen.cloned().unwrap_or_else(|| {
+                    Err(format!(
+                        "it lists {count} angles and the value's Name is {}: accepted is a Name that is the Notation of \
+                         one of them, or a specification for each angle",
+                        or_missing(value)
+                    ))
+                })
+            }
         }
-        let geometry = measured.and_then(|spec| spec.child("GeometryChoice"));
-        let Some(choice) = geometry.and_then(|geometry| geometry.children.first()) else {
-            return Err(
-                "it says no geometry, accepted are MultiAngle, and SingleAngle of 45 and 0"
-                    .to_owned(),
-            );
-        };
-        match choice.name.as_str() {
-            "MultiAngle" => multi_angle(choice, value),
-            "SingleAngle" => single_angle(choice),
-            other => Err(format!(
-                "its geometry is {}, accepted are MultiAngle, and SingleAngle of 45 and 0",
-                told(other)
-            )),
-        }
+    }
+}
+
+/// A wavelength in nm that a document names.
+pub(super) fn wavelength(text: &str, what: &str) -> Result<f64, String> {
+    let nm: Option<f64> = text.parse().ok();
+    nm.filter(|nm| WAVELENGTHS_NM.contains(nm)).ok_or_else(|| {
+        format!(
+            "{what} is {:?}, accepted is a wavelength in nm from {} to below {}",
+            told(text),
+            WAVELENGTHS_NM.start,
+            WAVELENGTHS_NM.end
+        )
+    })
+}
+
+fn wavelengths(measured: Option<&Element>) -> Result<(f64, f64), String> {
+    let range = measured.and_then(|spec| spec.child("WavelengthRange"));
+    let said = |name| range.and_then(|range| range.attribute(name));
+    let (Some(start), Some(step)) = (said("StartWL"), said("Increment")) else {
+        return Err(
+            "it has no WavelengthRange, accepted is one with StartWL and Increment".to_owned(),
+        );
+    };
+    let start = wavelength(start, "its StartWL")?;
+    let nm = step.parse().ok().filter(|step| (0.5..=20.0).contains(step));
+    let step = nm.ok_or_else(|| {
+        format!(
+            "its Increment is {:?}, accepted are steps from 0.5 to 20 nm",
+            told(step)
+        )
+    })?;
+    Ok((start, step))
+}
+
+fn instrument(measured: &Element) -> Option<Rc<str>> {
+    let device = measured.child("Device")?;
+    let said: Vec<String> = ["Manufacturer", "Model", "SerialNumber"]
+        .iter()
+        .filter_map(|name| device.said(name))
+        .map(|text| text.chars().take(NOTE_CHARACTERS).collect())
+        .collect();
+    (!said.is_empty()).then(|| said.join(" ").into())
+}
+
+fn geometry(measured: Option<&Element>) -> Result<Geometry, String> {
+    let kind = measured.and_then(|spec| spec.said("MeasurementType"));
+    if !kind.is_some_and(|kind| matches!(kind, "Spectrum_Reflectance" | "Colorimetric_Reflectance"))
+    {
+        return Err(format!(
+            "its measurement is {}, accepted are Spectrum_Reflectance and Colorimetric_Reflectance",
+            or_missing(kind)
+        ));
+    }
+    let choice = measured
+        .and_then(|spec| spec.child("GeometryChoice"))
+        .and_then(|geometry| geometry.children.first());
+    let Some(choice) = choice else {
+        return Err(
+            "it says no geometry, accepted are MultiAngle, and SingleAngle of 45 and 0".to_owned(),
+        );
+    };
+    match choice.name.as_str() {
+        "MultiAngle" => multi_angle(choice),
+        "SingleAngle" => single_angle(choice).map(Geometry::One),
+        other => Err(format!(
+            "its geometry is {}, accepted are MultiAngle, and SingleAngle of 45 and 0",
+            told(other)
+        )),
     }
 }
 
@@ -113,37 +164,40 @@ fn degrees(of: &Element, name: &str) -> Result<f64, String> {
         .ok_or_else(|| format!("its {name} is {}, accepted are degrees", or_missing(said)))
 }
 
-fn multi_angle(choice: &Element, value: Option<&str>) -> Result<Angles, String> {
-    let angles: Vec<&Element> = choice.all("BRDFAngle").collect();
-    let chosen = match angles[..] {
-        [] => return Err("its MultiAngle holds no BRDFAngle".to_owned()),
-        [only] => only,
-        _ if angles.len() > MOST_ANGLES => {
-            return Err(format!(
-                "it lists {} angles, accepted are {MOST_ANGLES}",
-                angles.len()
-            ));
+fn multi_angle(choice: &Element) -> Result<Geometry, String> {
+    let count = choice.all("BRDFAngle").count();
+    if count > MOST_ANGLES {
+        return Err(format!(
+            "it lists {count} angles, accepted are {MOST_ANGLES}"
+        ));
+    }
+    let mut angles = choice.all("BRDFAngle");
+    match (angles.next(), count) {
+        (None, _) => {
+            Err("its MultiAngle holds no BRDFAngle, accepted is one for each angle".to_owned())
         }
+        (Some(only), 1) => brdf_angle(only).map(Geometry::One),
         _ => {
-            let named = |angle: &&Element| {
-                angle
-                    .attribute("Notation")
-                    .is_some_and(|notation| Some(notation) == value)
-            };
-            let mut named = angles.iter().copied().filter(named);
-            match (named.next(), named.next()) {
-                (Some(angle), None) => angle,
-                _ => {
-                    return Err(format!(
-                        "it lists {} angles and the value's Name is {}: accepted is a Name that is the Notation of one of \
-                         them, or a specification for each angle",
-                        angles.len(),
-                        or_missing(value)
-                    ));
-                }
+            let mut named = BTreeMap::new();
+            for angle in choice.all("BRDFAngle") {
+                let notation = angle.attribute("Notation").unwrap_or_default();
+                let read = if named.contains_key(notation) {
+                    Err(format!(
+                        "several of its angles have the Notation {:?}, accepted is one",
+                        told(notation)
+                    ))
+                } else {
+                    brdf_angle(angle)
+                };
+                named.insert(notation.to_owned(), read);
             }
+            named.remove("");
+            Ok(Geometry::Several(named, count))
         }
-    };
+    }
+}
+
+fn brdf_angle(chosen: &Element) -> Result<Angles, String> {
     if chosen.child("Azimuth").is_some() && degrees(chosen, "Azimuth")? != 0.0 {
         return Err(
             "its angle lies out of the plane of incidence, accepted is no Azimuth, or 0".to_owned(),

@@ -1,13 +1,23 @@
 //! The colors of an object of `CxF3` that are readings of a paint at an angle.
 
+use std::rc::Rc;
+
 use super::Specifications;
 use super::document::Element;
-use super::specification::{Angles, Specification};
+use super::specification::{Angles, Specification, wavelength};
 use crate::color::{Illuminant, Lab, Observer, Wavelengths, WhitePoint};
 use crate::measurement::readings::told;
 
 /// Most values of one spectrum.
 const MOST_BANDS: usize = 1000;
+/// Names of colors that are readings.
+const COLORS: [&str; 5] = [
+    "ColorCIELab",
+    "ColorCIELCh",
+    "ColorCIEXYZ",
+    "ReflectanceSpectrum",
+    "CustomSpectrum",
+];
 
 /// In what a color is given.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,28 +47,37 @@ pub(super) struct Value {
     pub kind: Kind,
     pub angles: Angles,
     pub numbers: Vec<f64>,
-    pub instrument: Option<String>,
+    pub instrument: Option<Rc<str>>,
+}
+
+/// Colors of an object that are no readings: how many, and why the first is none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Unusable {
+    pub count: usize,
+    pub reason: Option<String>,
+}
+
+/// The colors of an object.
+pub(super) fn colors_of(object: &Element) -> impl Iterator<Item = &Element> {
+    object
+        .all("ColorValues")
+        .flat_map(|of| &of.children)
+        .filter(|entry| COLORS.contains(&entry.name.as_str()))
 }
 
 /// The values of an object that are readings, and why others are none.
 pub(super) fn values_of(
     object: &Element,
     specifications: &Specifications,
-) -> (Vec<Value>, Vec<String>) {
-    let (mut values, mut unusable) = (Vec::new(), Vec::new());
-    for entry in object.all("ColorValues").flat_map(|of| &of.children) {
-        let is_color = matches!(
-            entry.name.as_str(),
-            "ColorCIELab"
-                | "ColorCIELCh"
-                | "ColorCIEXYZ"
-                | "ReflectanceSpectrum"
-                | "CustomSpectrum"
-        );
-        if is_color {
-            match value(entry, specifications) {
-                Ok(value) => values.push(value),
-                Err(reason) => unusable.push(format!("{} {reason}", entry.name)),
+) -> (Vec<Value>, Unusable) {
+    let (mut values, mut unusable) = (Vec::new(), Unusable::default());
+    for entry in colors_of(object) {
+        match value(entry, specifications) {
+            Ok(value) => values.push(value),
+            Err(reason) => {
+                unusable.count += 1;
+                let reason = || format!("{} {reason}", entry.name);
+                unusable.reason.get_or_insert_with(reason);
             }
         }
     }
@@ -80,8 +99,8 @@ fn value(entry: &Element, specifications: &Specifications) -> Result<Value, Stri
         "CustomSpectrum" => points(entry).map_err(placed)?,
         _ => {
             let light = (
-                of.illuminant().map_err(placed)?,
-                of.observer().map_err(placed)?,
+                of.illuminant.clone().map_err(placed)?,
+                of.observer.clone().map_err(placed)?,
             );
             let lab = lab(entry, WhitePoint::of(light.0, light.1)).map_err(placed)?;
             (Kind::Lab(light.0, light.1), lab.to_array().to_vec())
@@ -91,7 +110,7 @@ fn value(entry: &Element, specifications: &Specifications) -> Result<Value, Stri
         kind,
         angles,
         numbers,
-        instrument: of.instrument(),
+        instrument: of.instrument.clone(),
     })
 }
 
@@ -125,22 +144,18 @@ fn lab(entry: &Element, white: WhitePoint) -> Result<Lab, String> {
 }
 
 fn spectrum(entry: &Element, of: &Specification) -> Result<(Kind, Vec<f64>), String> {
-    let range = of.wavelengths();
-    let start = match entry.attribute("StartWL") {
-        Some(text) => Some(number(text, "StartWL")?),
-        None => range.map(|range| range.0),
-    };
-    let (Some(start), Some((_, step))) = (start, range) else {
-        return Err(
-            "it has no WavelengthRange, accepted is one with StartWL and Increment".to_owned(),
-        );
-    };
+    let start = entry
+        .attribute("StartWL")
+        .map(|text| wavelength(text, "StartWL"))
+        .transpose()?;
+    let (first, step) = of.wavelengths.clone()?;
+    let start = start.unwrap_or(first);
     let factors = entry.text.split_ascii_whitespace().take(MOST_BANDS + 1);
     let factors = factors
         .map(|text| number(text, "a value"))
         .collect::<Result<Vec<f64>, _>>()?;
     if factors.len() > MOST_BANDS {
-        return Err(format!("it has more than {MOST_BANDS} values"));
+        return Err(too_many());
     }
     let nm: Vec<f64> = (0..factors.len())
         .map(|k| start + step * k as f64)
@@ -148,14 +163,18 @@ fn spectrum(entry: &Element, of: &Specification) -> Result<(Kind, Vec<f64>), Str
     spectral(nm, factors)
 }
 
+fn too_many() -> String {
+    format!("it has more than {MOST_BANDS} values, accepted are {MOST_BANDS}")
+}
+
 fn points(entry: &Element) -> Result<(Kind, Vec<f64>), String> {
     let mut points = Vec::new();
     for point in entry.all("SpectralPoint") {
-        let wavelength = number(point.attribute("WL").unwrap_or_default(), "WL")?;
+        let wavelength = wavelength(point.attribute("WL").unwrap_or_default(), "WL")?;
         points.push((wavelength, number(&point.text, "SpectralPoint")?));
     }
     if points.len() > MOST_BANDS {
-        return Err(format!("it has more than {MOST_BANDS} values"));
+        return Err(too_many());
     }
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (nm, factors) = points.into_iter().unzip();
