@@ -116,7 +116,7 @@ fn a_picture_takes_the_fewest_samples_that_are_enough() {
         )
     };
     assert_eq!(picked(["--max-error", "100"]), (true, 1));
-    assert_eq!(picked(["--max-error", "1e-9"]), (false, 1024));
+    assert_eq!(picked(["--max-error", "1e-9"]), (false, 4096));
     assert_eq!(picked(["--max-seconds", "1e-6"]), (false, 1));
     let (met, samples) = picked(["--max-error", "1"]);
     assert!(met && (1..=1024).contains(&samples), "{samples}");
