@@ -14,29 +14,32 @@ use super::{output, show};
 use crate::measurement::{Layout, ReadOptions, ThetaHSpacing};
 use crate::workshop::{IngestOptions, Source, Work, WorkshopError, find, ingest_in_stages};
 
+const A_CSV: &str = "\
+A CSV of readings:
+
+    # name: my silver
+    # illuminant: D65
+    # observer: 10
+    # illumination_deg: 45
+    aspecular_deg,L,a,b
+    15,95.2,-0.6,0.9
+    45,48.7,-0.9,-1.2
+    110,24.1,-0.3,-1.8";
+
 /// Fit a measurement and keep it as a .paint.
 ///
 /// INPUT is a measured-paint package (a .zip or a folder), an RGL .bsdf, an MPI 2005 table, a MERL binary, or readings of a
 /// hand-held multi-angle instrument as CSV or CxF3. What it is is recognised from its contents; --layout overrides that.
 ///
 /// A CSV of readings has a line for each angle: aspecular_deg first, degrees from the mirror direction towards the light,
-/// then L, a, b or a spectrum nm400 to nm700 (1 is white). Lines above the columns say what a table cannot:
-///
-///     # name: my silver
-///     # illuminant: D65
-///     # observer: 10
-///     # illumination_deg: 45
-///     aspecular_deg,L,a,b
-///     15,95.2,-0.6,0.9
-///     45,48.7,-0.9,-1.2
-///     110,24.1,-0.3,-1.8
+/// then L, a, b or a spectrum nm400 to nm700 (1 is white). Lines above the columns say what a table cannot.
 ///
 /// Of a CxF3 document with several paints, --name says which. From readings alone a base is fitted that reads the same;
 /// they show neither flakes nor the clear coat: of CSV and CxF3 one of index 1.5 is assumed unless --coat-ior says otherwise.
 // A terminal shows backticks as they are.
 #[allow(clippy::doc_markdown)]
 #[derive(Args, Clone, Debug)]
-#[command(verbatim_doc_comment)]
+#[command(verbatim_doc_comment, after_long_help = A_CSV)]
 pub struct Ingest {
     /// The measurement.
     #[arg(value_name = "INPUT")]
