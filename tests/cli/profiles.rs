@@ -143,3 +143,23 @@ fn an_estimate_is_of_the_order_of_what_then_happens() {
     let lab = made["error"]["lab"].as_f64().expect("a number");
     assert!((stated - lab).abs() < 1e-6, "{stated} {lab}");
 }
+
+/// As coarse. Of so few pixels getting ready takes longer than drawing with few samples, and less than with many.
+#[test]
+fn a_tiny_picture_of_many_samples_is_not_taken_for_a_large_one() {
+    let desk = Desk::new();
+    let asked = [
+        "preview",
+        "sample:white",
+        "--size",
+        "8x8",
+        "--spp",
+        "4096",
+        "--json",
+    ];
+    let estimate = json(&desk.ok(&[&["estimate"], &asked[..]].concat()).stdout);
+    let begun = std::time::Instant::now();
+    desk.ok(&[&asked[..], &["--out", "p.png"]].concat());
+    let ratio = estimate["seconds"].as_f64().expect("seconds") / begun.elapsed().as_secs_f64();
+    assert!((0.1..10.0).contains(&ratio), "{estimate} {ratio}");
+}

@@ -20,6 +20,9 @@ const LONGER: f64 = 3.0;
 /// Part of a larger sample's time that is at least proportional to the work.
 const LEAST_SHARE: f64 = 0.25;
 
+/// By how many times the samples of a picture that is small itself are more, to the same end.
+const MORE: u32 = 32;
+
 /// Samples per pixel from which on time is proportional to them.
 const ENOUGH: u32 = 8;
 
@@ -109,11 +112,20 @@ impl SmallPictures {
             let scale = (f64::from(side) / longer).min(1.0);
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pixels
             let size = (options.size).map(|n| ((f64::from(n) * scale).round() as u32).max(1));
+            let pixels = f64::from(size[0]) * f64::from(size[1]);
+            // A picture that is small itself tells drawing from getting ready by more samples of the same pixels.
+            let again = drawn.iter().any(|smaller| smaller.pixels >= pixels);
+            let samples_per_pixel = if again {
+                samples_per_pixel
+                    .saturating_mul(MORE)
+                    .min(work.limits.samples)
+            } else {
+                samples_per_pixel
+            };
             let (seconds, made) = time(PreviewOptions {
                 size,
                 ..work.with(samples_per_pixel)
             });
-            let pixels = f64::from(size[0]) * f64::from(size[1]);
             drawn.push(SmallPicture {
                 work: pixels * batches(samples_per_pixel),
                 seconds,
