@@ -92,16 +92,13 @@ async fn more_requests_than_are_taken_are_refused_at_once_and_health_answers_sti
         ..ServiceConfig::new(data.path().to_owned())
     };
     let house = House::with(config).await;
-    let mut slow = tokio::net::TcpStream::connect(house.address)
-        .await
-        .expect("connects");
-    let begin = b"POST /v1/paints HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nhalf";
-    slow.write_all(begin).await.expect("sent");
     let deadline = Instant::now() + Duration::from_secs(20);
-    let refused = loop {
+    let (slow, refused) = loop {
+        // The upload that finds the place taken by a question is refused itself.
+        let slow = half_an_upload(house.address).await;
         let answer = house.get("/v1/paints").await;
         if answer.status != 200 {
-            break answer;
+            break (slow, answer);
         }
         assert!(Instant::now() < deadline, "the upload holds its place");
     };
@@ -115,6 +112,17 @@ async fn more_requests_than_are_taken_are_refused_at_once_and_health_answers_sti
         assert!(Instant::now() < deadline, "the place is free again");
     }
     house.close().await;
+}
+
+async fn half_an_upload(address: std::net::SocketAddr) -> tokio::net::TcpStream {
+    let mut slow = tokio::net::TcpStream::connect(address)
+        .await
+        .expect("connects");
+    let begin = b"POST /v1/paints HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nhalf";
+    slow.write_all(begin).await.expect("sent");
+    // Time to be taken in before the next question comes.
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    slow
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -65,7 +65,6 @@ async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
             .starts_with("event: end")
     );
 
-    let begun = Instant::now();
     let answer = house.submit(b"slow two").await;
     let address = answer.header("location").expect("a job").to_owned();
     let cancelled = house.ask("DELETE", &address, &[], b"").await;
@@ -74,7 +73,6 @@ async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
         (200, &json!("cancelled")),
         "{cancelled:?}"
     );
-    assert!(begun.elapsed() < Duration::from_secs(3));
     assert_eq!(house.get(&address).await.json()["state"], "cancelled");
 
     let failed = house.submit(b"not one").await;
@@ -112,7 +110,9 @@ async fn a_restart_changes_nothing_and_goes_on_with_what_was_under_way() {
     let before = join_all(addresses.iter().map(|path| house.get(path))).await;
     let answer = house.submit(b"slow three").await;
     let job = answer.header("location").expect("a job").to_owned();
-    tokio::time::sleep(Duration::from_millis(100)).await;
+    while house.get(&job).await.json()["state"] == "queued" {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
     assert_eq!(house.get(&job).await.json()["state"], "running");
     house.close().await;
 
