@@ -2,6 +2,7 @@
 
 use image::ExtendedColorType;
 
+use super::inverse_cdf::Step;
 use super::png_file::png;
 use super::textures::{Entry, MAX_ROWS, Textures};
 use super::{ExportError, alias, inverse_cdf};
@@ -52,7 +53,6 @@ impl Textures {
         let (slices, steps) = (flakes.slices(), inverse_cdf::STEPS);
         let blocks = slices.div_ceil(MAX_ROWS);
         let (width, height) = (steps * blocks, slices.div_ceil(blocks));
-        let mut index = vec![0_u16; width * height];
         if flakes.widest_slice() > usize::from(u16::MAX) {
             let accepted = usize::from(u16::MAX);
             return Err(ExportError::TooMany {
@@ -62,39 +62,34 @@ impl Textures {
             });
         }
         self.inverse_cdf_blocks = blocks;
-        self.slice_losses.reserve(slices);
-        for k in 0..slices {
-            let range = flakes.offsets[k] as usize..flakes.offsets[k + 1] as usize;
-            let first = k / blocks * width + k % blocks * steps;
-            let loss = inverse_cdf::write(
-                &flakes.probability[range.clone()],
-                &luminances[range],
-                &mut index[first..first + steps],
-            );
-            #[allow(clippy::cast_possible_truncation)] // stated to seven digits
-            self.slice_losses.push(loss.map(|v| v as f32));
-        }
-        let narrow = flakes.widest_slice() <= 256;
         let about = "cluster within the slice at cumulative probability (s + 1/2)/500: slice k holds columns \
                      500 (k mod blocks) + s of row k div blocks";
-        let (bytes, kind) = if narrow {
-            #[allow(clippy::cast_possible_truncation)] // at most 255
-            let pixels: Vec<u8> = index.iter().map(|&cluster| cluster as u8).collect();
-            (png(width, height, &pixels, ExtendedColorType::L8)?, "uint8")
+        let texels = width * height;
+        let (bytes, kind) = if flakes.widest_slice() <= 256 {
+            let index: Vec<u8> = self.steps(flakes, luminances, texels);
+            (png(width, height, &index, ExtendedColorType::L8)?, "uint8")
         } else {
+            let index: Vec<u16> = self.steps(flakes, luminances, texels);
             // PNG's samples are big-endian, the encoder takes the machine's order.
-            (
-                png(
-                    width,
-                    height,
-                    bytemuck::cast_slice(&index),
-                    ExtendedColorType::L16,
-                )?,
-                "uint16",
-            )
+            let bytes = bytemuck::cast_slice(&index);
+            (png(width, height, bytes, ExtendedColorType::L16)?, "uint16")
         };
         let entry = Entry::plain([width, height], "R", kind, about);
         self.push("inverse_cdf", "png", bytes, entry);
         Ok(())
+    }
+    /// The steps of all slices, slice after slice, and what each loses.
+    fn steps<T: Step>(&mut self, flakes: &Flakes, luminances: &[f64], texels: usize) -> Vec<T> {
+        let mut index = vec![T::of(0); texels];
+        self.slice_losses.reserve(flakes.slices());
+        let rows = index.chunks_exact_mut(inverse_cdf::STEPS);
+        for (row, range) in rows.zip(flakes.offsets.windows(2)) {
+            let range = range[0] as usize..range[1] as usize;
+            let probability = &flakes.probability[range.clone()];
+            let loss = inverse_cdf::write(probability, &luminances[range], row);
+            #[allow(clippy::cast_possible_truncation)] // stated to seven digits
+            self.slice_losses.push(loss.map(|v| v as f32));
+        }
+        index
     }
 }

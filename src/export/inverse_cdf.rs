@@ -54,13 +54,24 @@ impl Step for u16 {
     }
 }
 
-/// Fills the [`STEPS`] steps of a slice and returns its two losses.
+impl Step for u8 {
+    #[allow(clippy::cast_possible_truncation)] // checked where the texture is sized
+    fn of(k: usize) -> Self {
+        k as Self
+    }
+}
+
+/// Steps that are written at once: a cluster of fifty has ten, and the next one overwrites what is too much.
+const RUN: usize = 8;
+
+/// Writes the [`STEPS`] steps of a slice and returns its two losses.
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)] // at most 500
 #[allow(clippy::cast_sign_loss)] // cumulative probabilities are none
 pub(super) fn write<T: Step>(probability: &[f64], luminance: &[f64], steps: &mut [T]) -> [f64; 2] {
     let (count, width) = (STEPS as f64, 1.0 / STEPS as f64);
     let (mut next, mut cumulative, mut moved) = (0_usize, 0.0, 0.0);
     let (mut mean, mut stepped_mean) = (0.0, 0.0);
+    let mut row = [T::of(0); STEPS + RUN];
     let last = probability.len().saturating_sub(1);
     for (k, (&p, &y)) in probability.iter().zip(luminance).enumerate() {
         cumulative += p;
@@ -70,8 +81,8 @@ pub(super) fn write<T: Step>(probability: &[f64], luminance: &[f64], steps: &mut
         } else {
             ((cumulative * count + 0.5) as usize).clamp(next, STEPS)
         };
-        if end > next {
-            steps[next..end].fill(T::of(k));
+        for at in (next..end).step_by(RUN) {
+            row[at..at + RUN].copy_from_slice(&[T::of(k); RUN]);
         }
         let share = (end - next) as f64 * width;
         next = end;
@@ -79,6 +90,7 @@ pub(super) fn write<T: Step>(probability: &[f64], luminance: &[f64], steps: &mut
         mean += p * y;
         stepped_mean += share * y;
     }
+    steps.copy_from_slice(&row[..STEPS]);
     let change = if mean.abs() < 1e-6 {
         0.0
     } else {
