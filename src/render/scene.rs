@@ -85,7 +85,7 @@ impl Scene {
             exposure: match shape {
                 Shape::Sphere => 1.08,
                 Shape::Capsule => 0.93,
-                Shape::Panel => 0.88,
+                Shape::Panel => 0.76,
             },
             seed: 1,
         }
@@ -192,8 +192,8 @@ impl DirectionalLight {
                 irradiance: [0.22; 3],
             },
             Shape::Panel => Self {
-                towards: [-0.95, 0.60, 0.45],
-                irradiance: [0.80; 3],
+                towards: [-0.80, 0.90, 0.30],
+                irradiance: [0.50; 3],
             },
         }
     }
@@ -215,9 +215,9 @@ impl Camera {
                 field_of_view_deg: 18.0,
             },
             Shape::Panel => Self {
-                origin: [-0.45, 0.45, 2.8],
-                target: [0.0, -0.44, 0.0],
-                field_of_view_deg: 43.0,
+                origin: [-0.45, 0.30, 3.6],
+                target: [0.0, -0.50, 0.0],
+                field_of_view_deg: 34.0,
             },
         }
     }
@@ -229,7 +229,7 @@ impl Camera {
         let tall = match shape {
             Shape::Sphere => 1.0,
             Shape::Capsule => 0.68,
-            Shape::Panel => 0.84,
+            Shape::Panel => 0.72,
         };
         let share = (height as f32 / width.max(1) as f32).clamp(tall, 1.0);
         let tangent = (self.field_of_view_deg.to_radians() / 2.0).tan();

@@ -69,8 +69,9 @@ impl Surface {
                 }
             }
             Shape::Panel => {
-                // Turned from the key light: face at one side, and travel across.
-                let lean = 24.0_f32.to_radians();
+                // Leaning so far that its coat mirrors the strip overhead across one corner, and turned from the key
+                // light: face beside the streak, and travel across.
+                let lean = 38.0_f32.to_radians();
                 let (right, up) = (unit([1.0, 0.0, -0.22]), [0.0, lean.cos(), 0.0]);
                 let back = cross(right, [0.0, 1.0, 0.0]);
                 let up = unit(along(up, back, -lean.sin()));
