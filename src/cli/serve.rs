@@ -9,7 +9,7 @@ use tokio::net::TcpListener;
 use tokio::sync::Notify;
 
 use crate::paint::Limits;
-use crate::service::{self, App, ServeError, ServiceConfig, Workshop};
+use crate::service::{self, App, Origin, ServeError, ServiceConfig, Workshop};
 use crate::workshop::WorkshopError;
 
 /// Serve paints over HTTP, with the sample paints loaded.
@@ -26,6 +26,11 @@ pub struct Serve {
     /// Folder for catalogue, uploads and results; created if it is not there.
     #[arg(long, value_name = "DIR", default_value = "carpaint-data")]
     data: PathBuf,
+    /// Another address whose pages may ask for paints from a browser, such as `https://cars.example`;
+    /// `*` is all of them.
+    /// May be given several times. They read and make; none of them changes or deletes.
+    #[arg(long, value_name = "ORIGIN")]
+    allow_origin: Vec<Origin>,
     /// Do not load the sample paints.
     #[arg(long)]
     no_samples: bool,
@@ -68,7 +73,10 @@ impl Serve {
                 "whoever reaches this address may read, upload and delete; put a proxy in front that asks who calls"
             );
         }
-        let config = ServiceConfig::new(self.data.clone());
+        let config = ServiceConfig {
+            origins: self.allow_origin.clone(),
+            ..ServiceConfig::new(self.data.clone())
+        };
         let app = service::open(config, Arc::new(Workshop::new(Limits::default())))
             .await
             .map_err(refused)?;
@@ -109,10 +117,13 @@ async fn load(
     failed: Arc<Notify>,
 ) -> Result<(), WorkshopError> {
     let loaded = async {
-        if !no_samples {
-            service::load_samples(&app)
+        let whole = no_samples
+            || service::load_samples(&app)
                 .await
                 .map_err(|_| WorkshopError::internal("the sample paints could not be loaded"))?;
+        if !whole {
+            // The service goes down before it was ready.
+            return Ok(());
         }
         app.set_ready();
         if json {

@@ -113,10 +113,15 @@ impl Metrics {
             .record(time.as_secs_f64());
     }
 
+    /// Sorts request times into their buckets, so that those that nobody asks for do not pile up.
+    pub fn tidy(&self) {
+        self.handle.run_upkeep();
+    }
+
     /// The counts in Prometheus' text format.
     #[must_use]
     pub fn text(&self) -> String {
-        self.handle.run_upkeep();
+        self.tidy();
         self.handle.render()
     }
 }

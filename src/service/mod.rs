@@ -30,6 +30,7 @@ mod uploading;
 mod work;
 
 pub use app::App;
+pub use http::Origin;
 pub use resources::docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
@@ -71,6 +72,8 @@ pub struct ServiceConfig {
     pub write_time: Duration,
     /// Longest time for requests under way when the service goes down.
     pub grace: Duration,
+    /// Other addresses whose pages may call from a browser.
+    pub origins: Vec<Origin>,
 }
 
 impl ServiceConfig {
@@ -90,6 +93,7 @@ impl ServiceConfig {
             body_time: Duration::from_secs(10),
             write_time: Duration::from_secs(30),
             grace: Duration::from_secs(5),
+            origins: Vec::new(),
         }
     }
 }

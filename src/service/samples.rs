@@ -20,12 +20,12 @@ fn id_of(sample: &Sample, profile: &Profile) -> String {
 }
 
 /// Puts every sample paint that is not there yet into the catalogue, and takes out those of earlier recipes. Stops
-/// where it is when the service goes down.
+/// where it is when the service goes down, and says whether it came to its end.
 ///
 /// # Errors
 ///
 /// [`Problem`] when the store fails or a sample cannot be made.
-pub async fn load_samples(app: &App) -> Result<(), Problem> {
+pub async fn load_samples(app: &App) -> Result<bool, Problem> {
     let profile = Arc::new(Profile::standard());
     let bench = Workbench::new(rayon::current_num_threads(), SAMPLES.len());
     let mut current = BTreeSet::new();
@@ -41,14 +41,16 @@ pub async fn load_samples(app: &App) -> Result<(), Problem> {
                 })
             });
             let Ok(paint) = build.await? else {
-                return Ok(());
+                return Ok(false);
             };
             let paint = paint.map_err(Problem::internal)?;
-            app.keep_paint(&id, paint, None).await?;
+            let written = app.written_out(paint).await?;
+            app.keep_paint(&id, &written, None).await?;
         }
         current.insert(id);
     }
-    forget_earlier(app, &current).await
+    forget_earlier(app, &current).await?;
+    Ok(true)
 }
 
 /// Takes out samples that this version makes otherwise. Uploads of samples stay, and so do blends.
@@ -135,11 +137,11 @@ mod tests {
     }
 
     const GOLDEN: [&str; 6] = [
-        "model 6",
+        "model 7",
         "169 slices",
         "grain 15.9",
         "instrument 2.5016 1.4479 0.5679 0.1028 0.0167 0.0046",
-        "pictures 0.297 0.327",
+        "pictures 0.297 0.493",
         "glTF 0.41",
     ];
 
@@ -156,7 +158,8 @@ mod tests {
         let kept = |kind: &str| ids::made_of("p_", &kind);
         let upload = app.blobs.put("upload".into()).await.expect("is kept").hash;
         for (kind, measurement) in [("now", None), ("before", None), ("upload", Some(upload))] {
-            app.keep_paint(&kept(kind), white(), measurement)
+            let written = app.written_out(white()).await.expect("is written");
+            app.keep_paint(&kept(kind), &written, measurement)
                 .await
                 .expect("is kept");
         }

@@ -19,7 +19,7 @@ use tower::ServiceBuilder;
 use tower::limit::GlobalConcurrencyLimitLayer;
 
 use super::app::App;
-use super::http::{JSON_BYTES, Problem, envelope};
+use super::http::{JSON_BYTES, Problem, cors, envelope, held_to_pages};
 use super::resources::{
     accuracy, blend_bundles, blends, docs, environments, estimates, home, jobs, operations, paints,
     previews, readings, realisations, uploads, visibility,
@@ -74,6 +74,8 @@ pub fn router(app: App) -> Router {
         .layer(GlobalConcurrencyLimitLayer::with_semaphore(most));
     let around = ServiceBuilder::new()
         .layer(middleware::from_fn_with_state(app.clone(), envelope))
+        .option_layer((!app.config.origins.is_empty()).then(|| cors(&app.config.origins)))
+        .layer(middleware::from_fn_with_state(app.clone(), held_to_pages))
         // Uploads hold themselves to their own limit, piece by piece.
         .layer(DefaultBodyLimit::max(JSON_BYTES));
     resources()
@@ -107,7 +109,7 @@ fn resources() -> Router<App> {
         .route("/v1/paints/{id}/readings.cxf", get(readings::document))
         .route("/v1/blends", axum::routing::post(blends::create))
         .route("/v1/previews", axum::routing::post(previews::create))
-        .route("/v1/blends/{id}", get(blends::show))
+        .route("/v1/blends/{id}", get(blends::show).delete(blends::delete))
         .route("/v1/blends/{id}/bundle.zip", get(blend_bundles::bundle))
         .route(
             "/v1/blends/{id}/realisation.{format}",
@@ -158,6 +160,7 @@ pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = (
         .header_read_timeout(app.config.header_time);
 
     let mut stop = std::pin::pin!(stop);
+    let tidying = tokio::spawn(tidy_now_and_then(app.clone()));
     loop {
         let room = tokio::select! {
             room = Arc::clone(&connections).acquire_owned() => room,
@@ -180,6 +183,8 @@ pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = (
     }
     drop(listener);
     app.stop();
+    // Nobody holds the data folder any more when this returns.
+    let _ = tidying.await;
     let grace = app.config.grace;
     let _ = tokio::time::timeout(grace, async {
         graceful.shutdown().await;
@@ -188,6 +193,16 @@ pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = (
         }
     })
     .await;
+}
+
+async fn tidy_now_and_then(app: App) {
+    let mut every = tokio::time::interval(Duration::from_secs(10));
+    loop {
+        tokio::select! {
+            _ = every.tick() => app.metrics.tidy(),
+            () = app.stopped() => return,
+        }
+    }
 }
 
 /// A connection that ends when its peer takes nothing of an answer for so long.

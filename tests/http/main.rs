@@ -15,6 +15,7 @@ mod jobs;
 mod kill;
 mod lit;
 mod nearest;
+mod origins;
 mod paints;
 mod previews;
 mod problems;

@@ -15,7 +15,7 @@ pub enum Kind {
     UnknownPaint,
     /// No blend of this id.
     UnknownBlend,
-    /// No panorama of this id.
+    /// No environment of this id.
     UnknownEnvironment,
     /// No job of this id.
     UnknownJob,
@@ -23,6 +23,8 @@ pub enum Kind {
     NoMeasurement,
     /// The address does not take this method.
     MethodNotAllowed,
+    /// A browser sent it for a page of another address that may not.
+    OtherOrigin,
     /// The body did not come in time.
     RequestTimeout,
     /// A sample paint, which would be there again at the next start.
@@ -53,7 +55,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::MalformedRequest,
         Self::InvalidParameter,
         Self::UnknownAddress,
@@ -63,6 +65,7 @@ impl Kind {
         Self::UnknownJob,
         Self::NoMeasurement,
         Self::MethodNotAllowed,
+        Self::OtherOrigin,
         Self::RequestTimeout,
         Self::SamplePaint,
         Self::JobEnded,
@@ -123,6 +126,11 @@ impl Kind {
                 "method-not-allowed",
                 "This address does not take this method",
                 StatusCode::METHOD_NOT_ALLOWED,
+            ),
+            Self::OtherOrigin => (
+                "other-origin",
+                "Pages of this address may not do this",
+                StatusCode::FORBIDDEN,
             ),
             Self::RequestTimeout => (
                 "request-timeout",

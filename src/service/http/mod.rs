@@ -1,6 +1,6 @@
 //! What holds for every request, whatever it is about.
 //!
-//! Each passes the `envelope` (id, time, counts, panics). What it says is read strictly in `extract` and `query`, and
+//! Each passes the `envelope` (id, time, counts, panics); browsers are told by `origins` whose pages may call. What it says is read strictly in `extract` and `query`, and
 //! what it prefers in `waiting` and `idempotency`, and an upload comes in through `receiving`; what is wrong with it becomes a problem in `problem`, which says what
 //! is `accepted` instead, and all else an `answer` with an `ETag` and how long it keeps.
 //!
@@ -14,6 +14,7 @@ mod envelope;
 mod extract;
 mod idempotency;
 mod kind;
+mod origins;
 mod problem;
 mod query;
 pub mod receiving;
@@ -25,5 +26,6 @@ pub use envelope::envelope;
 pub use extract::{Address, JSON_BYTES, Json, NoQuery, Query, QueryOfTwo};
 pub use idempotency::Idempotency;
 pub use kind::Kind;
+pub use origins::{Origin, cors, held_to_pages};
 pub use problem::{Place, Problem, ProblemDocument};
 pub use waiting::Prefer;

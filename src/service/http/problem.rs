@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::kind::Kind;
+use super::origins;
 use crate::service::work::{Fault, WorkError};
 use crate::store::StoreError;
 use crate::workshop::accepted;
@@ -299,9 +300,11 @@ pub fn finish(mut response: Response, request_id: &str) -> Response {
     let mut finished = HttpResponse::new(Body::from(body));
     *finished.status_mut() = problem.kind.told().2;
     let headers = finished.headers_mut();
-    for kept in [header::ALLOW, header::RETRY_AFTER, header::LOCATION] {
-        if let Some(value) = response.headers().get(&kept) {
-            headers.insert(kept, value.clone());
+    for (name, value) in response.headers() {
+        let kept = [header::ALLOW, header::RETRY_AFTER, header::LOCATION].contains(name)
+            || origins::is_told(name);
+        if kept {
+            headers.append(name, value.clone());
         }
     }
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
