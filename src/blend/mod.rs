@@ -250,6 +250,13 @@ impl Blend {
         }
     }
 
+    /// Nodes of the color tables of all its paints.
+    #[must_use]
+    pub fn color_table_nodes(&self) -> usize {
+        let nodes = |paint: &BlendedPaint| paint.color_table.nodes().len();
+        self.paints.iter().map(nodes).sum()
+    }
+
     /// Name and content hash of each paint, in the order asked for.
     pub fn ingredients(&self) -> impl Iterator<Item = (&str, &str)> + Clone {
         self.asked

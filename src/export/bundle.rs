@@ -4,6 +4,7 @@
 //! are 1980-01-01 and the order is fixed, so that equal paints give equal bytes.
 
 use std::io::{Cursor, Write};
+use std::sync::OnceLock;
 
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
@@ -21,6 +22,20 @@ const COMPANIONS: [(&str, &str); 5] = [
     ("index.html", include_str!("shader/index.html")),
     ("README.txt", include_str!("shader/README.txt")),
 ];
+
+/// Hash of the files that are the same in every bundle, in hexadecimal digits.
+#[must_use]
+pub fn companions_hash() -> &'static str {
+    static HASH: OnceLock<String> = OnceLock::new();
+    HASH.get_or_init(|| {
+        let mut hasher = blake3::Hasher::new();
+        for part in COMPANIONS.iter().flat_map(|(name, text)| [name, text]) {
+            hasher.update(&(part.len() as u64).to_le_bytes());
+            hasher.update(part.as_bytes());
+        }
+        hasher.finalize().to_hex().to_string()
+    })
+}
 
 /// The texture bundle of a paint.
 ///

@@ -38,7 +38,7 @@ mod textures;
 
 pub use alias::{AliasEntry, alias_table};
 pub use blend_bundle::blend_bundle;
-pub use bundle::bundle;
+pub use bundle::{bundle, companions_hash};
 pub use clamp::Clamped;
 pub use cxf::CXF_MEDIA_TYPE;
 pub use glb::glb;
@@ -120,7 +120,7 @@ pub enum ExportError {
         index: usize,
     },
     /// More than textures can address.
-    #[error("{count} {what}, a texture holds at most {accepted}")]
+    #[error("{count} {what}, which is more than a texture holds; accepted are {accepted}")]
     TooMany {
         /// What there is too much of.
         what: &'static str,

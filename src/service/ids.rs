@@ -1,15 +1,16 @@
 //! Addresses: what names a paint, a blend, a job, a request.
 //!
 //! A paint's id is made of its upload and the options it was ingested with, a blend's of its paints in the order asked
-//! for and its options: the same request has the same address for ever. A panorama's is that of its bytes. Ids begin with a
+//! for and its options: the same request has the same address for ever. An environment's is that of its bytes. Ids begin with a
 //! letter that says of what.
 
 use serde::Serialize;
 
 use crate::store::Hash;
+use crate::workshop::companions_hash;
 
 /// Counts up when the same request would give other bytes: addresses and kept results of before are not met again.
-pub const MODEL: u32 = 6;
+pub const MODEL: u32 = 7;
 
 /// Hexadecimal digits after the prefix: 128 bits.
 const DIGITS: usize = 32;
@@ -36,6 +37,18 @@ pub fn of_content(prefix: &str, content: Hash) -> String {
 pub fn key(what: &str, parts: &impl Serialize) -> Hash {
     let parts = serde_json::to_vec(&(what, MODEL, parts)).expect("plain data serialises");
     Hash::of(&parts)
+}
+
+/// The hash of a file that these parts make. Beside the model the program's version and the files that every bundle has
+/// are part of it: what an earlier version wrote is not handed out by a later one.
+///
+/// # Panics
+///
+/// As [`key`].
+#[must_use]
+pub fn result(what: &str, parts: &impl Serialize) -> Hash {
+    let version = (env!("CARGO_PKG_VERSION"), companions_hash());
+    key(what, &(version, parts))
 }
 
 /// The name of a request, by what its caller said: the same before and after an upgrade, as an idempotency key is.

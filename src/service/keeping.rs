@@ -2,13 +2,26 @@
 
 use std::sync::Arc;
 
+use bytes::Bytes;
+
 use super::app::App;
 use super::environments::unknown_environment;
 use super::http::Problem;
-use super::shelf::unknown_paint;
+use super::shelf::{unknown_blend, unknown_paint};
 use super::work::{Thing, colors};
 use crate::paint::{NotFinite, PaintFile};
-use crate::store::{BlobBytes, EnvironmentRecord, Hash, PaintRecord, Visibility};
+use crate::store::{BlobBytes, EnvironmentRecord, Hash, PaintRecord, StoreError, Visibility};
+
+/// What is kept of a paint, worked out.
+#[derive(Debug)]
+pub struct WrittenOut {
+    bytes: Bytes,
+    content: Hash,
+    name: String,
+    source: String,
+    /// Its colors as an instrument reads them, where they could be read.
+    colors: Option<Vec<f64>>,
+}
 
 impl App {
     /// Whether a paint has this id.
@@ -33,18 +46,12 @@ impl App {
         Ok(())
     }
 
-    /// Keeps a paint under an id. Nothing happens where the id is taken.
+    /// Makes of a paint what is kept of it.
     ///
     /// # Errors
     ///
-    /// [`Problem`] when the store fails.
-    pub async fn keep_paint(
-        &self,
-        id: &str,
-        file: PaintFile,
-        measurement: Option<Hash>,
-    ) -> Result<(), Problem> {
-        let _writing = self.removal.read().await;
+    /// [`Problem`] for a paint that has no file, which is a bug.
+    pub async fn written_out(&self, file: PaintFile) -> Result<WrittenOut, Problem> {
         let works = Arc::clone(&self.works);
         let worked_out = tokio::task::spawn_blocking(move || {
             let content = Hash::from(file.paint.content_hash());
@@ -53,25 +60,45 @@ impl App {
                 file.name.clone(),
                 file.provenance.source.clone(),
             );
-            let colors = colors::read(&*works, &Thing::Paint(Box::new(file)));
-            Ok::<_, NotFinite>((bytes, content, name, source, colors))
+            let colors = colors::read(&*works, &Thing::Paint(Box::new(file))).ok();
+            Ok::<_, NotFinite>(WrittenOut {
+                bytes: bytes.into(),
+                content,
+                name,
+                source,
+                colors,
+            })
         });
         let worked_out = worked_out.await.map_err(Problem::internal)?;
-        let (bytes, content, name, source, colors) = worked_out.map_err(Problem::internal)?;
-        let paint = self.blobs.put(bytes.into()).await?.hash;
+        worked_out.map_err(Problem::internal)
+    }
+
+    /// Keeps a paint under an id. Nothing happens where the id is taken.
+    ///
+    /// # Errors
+    ///
+    /// [`StoreError`] when the store fails; it may go well later.
+    pub async fn keep_paint(
+        &self,
+        id: &str,
+        written: &WrittenOut,
+        measurement: Option<Hash>,
+    ) -> Result<(), StoreError> {
+        let _writing = self.removal.read().await;
+        let paint = self.blobs.put(written.bytes.clone()).await?.hash;
         let record = PaintRecord {
             id: id.to_owned(),
-            name,
-            source,
+            name: written.name.clone(),
+            source: written.source.clone(),
             measurement,
             paint,
-            content,
+            content: written.content,
             visibility: Visibility::default(),
         };
         self.catalogue.add_paint(&record).await?;
         // What is not noted now is when somebody asks for it; the paint is kept all the same.
-        if let Ok(colors) = colors {
-            let _ = colors::note(self, paint, &colors).await;
+        if let Some(colors) = &written.colors {
+            let _ = colors::note(self, paint, colors).await;
         }
         Ok(())
     }
@@ -108,6 +135,19 @@ impl App {
             self.forget_unnamed(blob).await?;
         }
         Ok(())
+    }
+
+    /// Forgets a blend, and its file unless something else names it.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when there is none.
+    pub async fn forget_blend(&self, id: &str) -> Result<(), Problem> {
+        let _removing = self.removal.write().await;
+        let gone = self.catalogue.remove_blend(id).await?;
+        let gone = gone.ok_or_else(|| unknown_blend(id))?;
+        self.shelf.invalidate(id).await;
+        self.forget_unnamed(gone.blend).await
     }
 
     /// A blob that the record of an environment names, to be streamed.

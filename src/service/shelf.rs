@@ -38,8 +38,11 @@ impl Shelved {
     /// The answer that tells what is known about it.
     #[must_use]
     pub fn told(&self) -> Answer {
-        let document = self.document.clone();
-        Answer::result("application/json", document, Keep::Revalidated)
+        Answer::result(
+            "application/json",
+            self.document.clone(),
+            self.keep_changing(),
+        )
     }
 
     /// How long files and pictures of it may be kept: what is private, by who asked for it.
@@ -49,6 +52,12 @@ impl Shelved {
             Visibility::Published => Keep::ForEver,
             Visibility::Private => Keep::Own,
         }
+    }
+
+    /// How long may be kept what another version or another day tells otherwise.
+    #[must_use]
+    pub fn keep_changing(&self) -> Keep {
+        self.keep().revalidated()
     }
 
     /// The paint, if it is one.
@@ -63,16 +72,22 @@ impl Shelved {
     /// Bytes in memory, about.
     #[must_use]
     pub fn weight(&self) -> u32 {
-        let clusters = match &self.thing {
-            Thing::Paint(file) => file
-                .paint
-                .flakes
-                .as_ref()
-                .map_or(0, crate::paint::Flakes::clusters),
-            Thing::Blend(blend) => blend.report().clusters * blend.len(),
+        let (clusters, nodes) = match &self.thing {
+            Thing::Paint(file) => {
+                let flakes = file.paint.flakes.as_ref();
+                (
+                    flakes.map_or(0, crate::paint::Flakes::clusters),
+                    file.paint.color_table.nodes().len(),
+                )
+            }
+            Thing::Blend(blend) => (
+                blend.report().clusters * blend.len(),
+                blend.color_table_nodes(),
+            ),
         };
-        // A box is 24 bytes and a probability 8.
-        u32::try_from(clusters * 32 + self.document.bytes.len() + (16 << 10)).unwrap_or(u32::MAX)
+        // A box is 24 bytes and a probability 8; a node of a color table is 24.
+        let bytes = clusters * 32 + nodes * 24 + self.document.bytes.len() + (16 << 10);
+        u32::try_from(bytes).unwrap_or(u32::MAX)
     }
 }
 
@@ -96,10 +111,7 @@ impl App {
     pub async fn blend(&self, id: &str) -> Result<Arc<Shelved>, Problem> {
         self.shelved(id, "b_", || self.read_blend(id))
             .await?
-            .ok_or_else(|| {
-                Problem::new(Kind::UnknownBlend, format!("There is no blend {id:?}."))
-                    .accepting("the id of an answer to POST /v1/blends")
-            })
+            .ok_or_else(|| unknown_blend(id))
     }
 
     /// From the shelf, or read once however many ask.
@@ -128,7 +140,10 @@ impl App {
             let _reading = self.removal.read().await;
             let on_record = match &shelved.thing {
                 Thing::Paint(_) => self.catalogue.paint(id).await?.map(|of| of.visibility),
-                Thing::Blend(_) => self.catalogue.blend(id).await?.map(|_| shelved.visibility),
+                Thing::Blend(_) => match self.catalogue.blend(id).await? {
+                    Some(record) => Some(self.visibility_of_blend(&record.paints).await?),
+                    None => None,
+                },
             };
             if on_record == Some(shelved.visibility) {
                 return Ok(Some(shelved));
@@ -190,15 +205,7 @@ impl App {
             return Ok(None);
         };
         let options: BlendOptions = serde_json::from_str(&options).map_err(Problem::internal)?;
-        let mut visibility = Visibility::Published;
-        for paint in &paints {
-            // A paint that is gone says no more who may see it.
-            if let Some(paint) = self.catalogue.paint(paint).await?
-                && paint.visibility == Visibility::Private
-            {
-                visibility = Visibility::Private;
-            }
-        }
+        let visibility = self.visibility_of_blend(&paints).await?;
         let bytes = self.stored(file).await?;
         let (limits, works) = (self.config.limits, Arc::clone(&self.works));
         let shelve = move || -> Result<Shelved, Problem> {
@@ -226,11 +233,29 @@ impl App {
         self.bench.run(shelve).await?.map(Some)
     }
 
+    /// A blend is as private as the most private of its paints. One that is gone says no more who may see it.
+    async fn visibility_of_blend(&self, paints: &[String]) -> Result<Visibility, Problem> {
+        for paint in paints {
+            let record = self.catalogue.paint(paint).await?;
+            if record.is_some_and(|paint| paint.visibility == Visibility::Private) {
+                return Ok(Visibility::Private);
+            }
+        }
+        Ok(Visibility::Published)
+    }
+
     /// A blob that a record names.
     async fn stored(&self, blob: Hash) -> Result<Bytes, Problem> {
         let bytes = self.blobs.read(blob).await?;
         bytes.ok_or_else(|| Problem::internal(format!("blob {blob} is on record but not there")))
     }
+}
+
+/// The problem of an id that no blend has.
+#[must_use]
+pub fn unknown_blend(id: &str) -> Problem {
+    Problem::new(Kind::UnknownBlend, format!("There is no blend {id:?}."))
+        .accepting("the id of an answer to POST /v1/blends")
 }
 
 /// The problem of an id that no paint has.

@@ -204,6 +204,9 @@ pub trait Blends: Send + Sync {
 
     /// The blend of this id.
     fn blend<'a>(&'a self, id: &'a str) -> Task<'a, Option<BlendRecord>>;
+
+    /// Removes a blend and hands out what was on record.
+    fn remove_blend<'a>(&'a self, id: &'a str) -> Task<'a, Option<BlendRecord>>;
 }
 
 /// Panoramas on record.

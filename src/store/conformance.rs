@@ -230,8 +230,27 @@ async fn records_conform(catalogue: &dyn Catalogue) {
     };
     assert!(catalogue.add_blend(&blend).await.expect("adds"));
     assert!(!catalogue.add_blend(&blend).await.expect("adds nothing"));
-    assert_eq!(catalogue.blend("b_1").await.expect("reads"), Some(blend));
+    assert_eq!(
+        catalogue.blend("b_1").await.expect("reads"),
+        Some(blend.clone())
+    );
     assert!(catalogue.blend("b_2").await.expect("reads").is_none());
+
+    let other = BlendRecord {
+        id: "b_3".to_owned(),
+        blend: Hash::of(b"only b_3"),
+        ..blend
+    };
+    assert!(catalogue.add_blend(&other).await.expect("adds"));
+    let file = other.blend;
+    assert!(catalogue.names_blob(file).await.expect("asks"));
+    let gone = catalogue.remove_blend("b_3").await.expect("removes");
+    assert_eq!(gone, Some(other));
+    let gone = catalogue
+        .remove_blend("b_3")
+        .await
+        .expect("removes nothing");
+    assert!(gone.is_none() && !catalogue.names_blob(file).await.expect("asks"));
 
     // A blob is named by paints, blends and the requests of unfinished jobs.
     let named = |blob: Hash| async move { catalogue.names_blob(blob).await.expect("asks") };

@@ -22,7 +22,7 @@ mod study;
 mod target;
 mod thing;
 
-pub use crate::export::{CXF_MEDIA_TYPE, Gloss, Readings};
+pub use crate::export::{CXF_MEDIA_TYPE, Gloss, Readings, companions_hash};
 pub use crate::render::{Environment, EnvironmentError, EnvironmentFile, EnvironmentFormat, Shape};
 pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;

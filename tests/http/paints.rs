@@ -165,3 +165,26 @@ async fn a_private_paint_is_left_out_of_lists() {
     );
     house.close().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_blend_that_is_deleted_is_gone_with_its_file_and_can_be_made_again() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let (a, b) = (house.paint("silver").await, house.paint("blue").await);
+    let before = walk(&data.path().join("blobs"));
+    let blend = house.blend(&[&a, &b]).await;
+    let path = format!("/v1/blends/{blend}");
+    assert_eq!(walk(&data.path().join("blobs")), before + 1);
+    assert_eq!(house.ask("DELETE", &path, &[], b"").await.status, 204);
+    assert_eq!(walk(&data.path().join("blobs")), before);
+    house.get(&path).await.problem(404, "unknown-blend");
+    let preview = house
+        .get(&format!("{path}/preview.png?alpha=0.5&beta=0.5"))
+        .await;
+    preview.problem(404, "unknown-blend");
+    let again = house.ask("DELETE", &path, &[], b"").await;
+    again.problem(404, "unknown-blend");
+    assert_eq!(house.blend(&[&a, &b]).await, blend);
+    assert_eq!(house.get(&path).await.status, 200);
+    house.close().await;
+}

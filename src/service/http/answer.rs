@@ -26,6 +26,17 @@ pub enum Keep {
     Never,
 }
 
+impl Keep {
+    /// No longer than until it is asked again whether it changed, by the same callers.
+    #[must_use]
+    pub const fn revalidated(self) -> Self {
+        match self {
+            Self::ForEver => Self::Revalidated,
+            Self::Own | Self::Revalidated | Self::Never => self,
+        }
+    }
+}
+
 /// An answer with its content.
 #[derive(Debug)]
 pub struct Answer {

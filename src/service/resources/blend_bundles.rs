@@ -45,7 +45,7 @@ pub async fn bundle(
     let asked = query.profile.unwrap_or_default();
     asked.fits(&blend)?;
     let profile = asked.of_query()?;
-    let key = ids::key(
+    let key = ids::result(
         "blend_bundle",
         &(&blend.id, blend.file.to_string(), profile.export),
     );

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use axum::extract::State;
+use axum::http::StatusCode;
 use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
@@ -172,4 +173,21 @@ pub async fn show(
     _: NoQuery,
 ) -> Result<Answer, Problem> {
     Ok(app.blend(&id).await?.told())
+}
+
+/// Delete a blend. Whoever asks for the same again gets the same, found again or from the cache.
+#[utoipa::path(
+    delete, operation_id = "delete_blend", path = "/v1/blends/{id}", tag = "blends", params(("id" = String, Path, description = "Blend")),
+    responses(
+        (status = 204, description = "It is gone"),
+        BlendProblems,
+    )
+)]
+pub async fn delete(
+    State(app): State<App>,
+    Address(id): Address<String>,
+    _: NoQuery,
+) -> Result<StatusCode, Problem> {
+    runner::to_its_end(async move { app.forget_blend(&id).await }).await?;
+    Ok(StatusCode::NO_CONTENT)
 }

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::http::{
-    Address, Answer, BlendProblems, Idempotency, Json, Keep, Kind, NoQuery, PaintProblems, Problem,
+    Address, Answer, BlendProblems, Idempotency, Json, Kind, NoQuery, PaintProblems, Problem,
     ProblemDocument, Problems, Query, QueryOfTwo,
 };
 use crate::service::ids;
@@ -279,7 +279,11 @@ const ACCURACY: HeaderName = HeaderName::from_static("carpaint-accuracy");
 
 fn answer(drawn: Drawn, format: PreviewFormat, picked: Option<&Picked>) -> Answer {
     // What a target picks may change with the machine's load.
-    let keep = picked.map_or(drawn.keep, |_| Keep::Revalidated);
+    let keep = if picked.is_some() {
+        drawn.keep.revalidated()
+    } else {
+        drawn.keep
+    };
     let answer = match format {
         PreviewFormat::Json => Answer::bytes("application/json", drawn.report, keep),
         _ => Answer::result(format.drawn().media_type(), drawn.picture, keep),

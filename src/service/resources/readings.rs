@@ -52,7 +52,7 @@ pub async fn show(
         let gloss = works.gloss(paint)?;
         Ok(ReadingDocument { readings, gloss })
     };
-    let answer = |document: ReadingDocument| Answer::json(&document, Keep::Revalidated);
+    let answer = |document: ReadingDocument, keep| Answer::json(&document, keep);
     read(&app, &id, instruments, answer).await
 }
 
@@ -73,8 +73,8 @@ pub async fn table(
 ) -> Result<Answer, Problem> {
     let instrument =
         move |works: &dyn Works, paint: &Thing| works.readings(paint, query.angles.as_deref());
-    let answer = |readings: Readings| {
-        let table = Answer::bytes("text/csv", readings.to_csv(), Keep::Revalidated);
+    let answer = |readings: Readings, keep| {
+        let table = Answer::bytes("text/csv", readings.to_csv(), keep);
         table.saved_as(&format!("{id}.readings.csv"))
     };
     read(&app, &id, instrument, answer).await
@@ -101,8 +101,8 @@ pub async fn document(
     let instrument = move |works: &dyn Works, paint: &Thing| {
         works.readings_document(paint, query.angles.as_deref())
     };
-    let answer = |document: String| {
-        let document = Answer::bytes(CXF_MEDIA_TYPE, document, Keep::Revalidated);
+    let answer = |document: String, keep| {
+        let document = Answer::bytes(CXF_MEDIA_TYPE, document, keep);
         document.saved_as(&format!("{id}.readings.cxf"))
     };
     read(&app, &id, instrument, answer).await
@@ -113,12 +113,12 @@ async fn read<T: Send + 'static>(
     app: &App,
     id: &str,
     instruments: impl FnOnce(&dyn Works, &Thing) -> Result<T, WorkError> + Send + 'static,
-    answer: impl FnOnce(T) -> Answer,
+    answer: impl FnOnce(T, Keep) -> Answer,
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let paint = app.paint(id).await?;
-    let works = Arc::clone(&app.works);
+    let (works, keep) = (Arc::clone(&app.works), paint.keep_changing());
     let read = app.bench.run(move || instruments(&*works, &paint.thing));
     let told = read.await?.map_err(WorkError::of_query)?;
-    Ok(answer(told).stage("reading", begun.elapsed()))
+    Ok(answer(told, keep).stage("reading", begun.elapsed()))
 }

@@ -10,8 +10,7 @@ use utoipa::IntoParams;
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::http::{
-    Address, Answer, BlendProblems, Keep, PaintProblems, Problem, ProblemDocument, Query,
-    QueryOfTwo,
+    Address, Answer, BlendProblems, PaintProblems, Problem, ProblemDocument, Query, QueryOfTwo,
 };
 use crate::service::ids;
 use crate::service::parameters::{ProfileText, WeightQuery, targets};
@@ -106,7 +105,7 @@ async fn realise(
         profile = *found.profile();
         picked = Some(found);
     }
-    let key = ids::key(
+    let key = ids::result(
         "realisation",
         &(
             &thing.id,
@@ -134,7 +133,11 @@ async fn realise(
     };
     let result = app.results.get_or_compute(key, compute).await?;
     // What a target picks may change with the machine's load.
-    let keep = picked.as_ref().map_or(keep, |_| Keep::Revalidated);
+    let keep = if picked.is_some() {
+        keep.revalidated()
+    } else {
+        keep
+    };
     let answer = Answer::result(format.media_type(), result, keep).saved_as(&name);
     Ok(answer
         .picked(picked.as_ref())

@@ -49,7 +49,7 @@ pub async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Proble
     }
     let (canonical, places) = in_order_of_hashes(&shelved);
     let names: Vec<&str> = canonical.iter().map(|paint| paint.id.as_str()).collect();
-    let key = ids::key("blend", &(&names, profile));
+    let key = ids::key("blend", &(&names, profile.flakes, profile.blend));
     // Whichever order is asked for first finds the correspondence, the others wait for it.
     let file = loop {
         let (on, this, paints) = (app.clone(), Arc::clone(under_way), canonical.clone());

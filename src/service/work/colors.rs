@@ -104,5 +104,6 @@ async fn read_and_note(app: &App, paint: NotedPaint) -> Result<(), Problem> {
         return note(app, paint.paint, &numbers).await;
     }
     tracing::error!(paint = paint.id, "a paint on record cannot be read");
-    Ok(())
+    // Noted too, so that it is not tried at every question.
+    note(app, paint.paint, &[]).await
 }

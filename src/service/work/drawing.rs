@@ -39,11 +39,11 @@ pub fn key(
     format: PictureFormat,
 ) -> Hash {
     match view.show {
-        Show::Paint => ids::key(
+        Show::Paint => ids::result(
             "preview",
             &(&thing.id, thing.file.to_string(), weights, view, format),
         ),
-        Show::Aspecular => ids::key("aspecular", &(view, format)),
+        Show::Aspecular => ids::result("aspecular", &(view, format)),
     }
 }
 
@@ -75,14 +75,14 @@ pub async fn draw(
                 }
             };
             let unread = on.unread(view.environment.as_deref()).await?;
-            let drawn = bench.run_or_call_off(move || {
+            let drawn = bench.run_or_call_off(move || -> Result<Bytes, Problem> {
                 // Who waited for a place may be gone by now.
                 progress(0.0);
                 let environment = unread.as_ref().map(Unread::read).transpose()?;
                 let (thing, weights, light) =
                     (&thing.thing, weights.as_ref(), environment.as_deref());
                 let drawn = works.preview(thing, weights, &view, light, format, &progress);
-                drawn.map_err(WorkError::of_query)
+                Ok(kept_form(&drawn.map_err(WorkError::of_query)?))
             });
             let Ok(drawn) = drawn.await? else {
                 return Err(Problem::new(
@@ -90,9 +90,9 @@ pub async fn draw(
                     "Nobody waited for this picture any more.",
                 ));
             };
-            let picture = drawn?;
+            let kept = drawn?;
             counter.increment(1);
-            Ok(kept_form(&picture))
+            Ok(kept)
         };
         match app.results.get_or_compute(key, compute).await {
             // Whoever was before us gave up a moment ago.

@@ -201,15 +201,15 @@ async fn run_to_end(app: &App, under_way: &Arc<UnderWay>) -> Result<Option<JobDo
         () = under_way.called_off() => None,
         () = app.stopped() => return Ok(None),
     };
-    if lane.is_none() {
+    let Some(lane) = lane else {
         return end(app, job, JobState::Cancelled, None).await.map(Some);
-    }
+    };
     app.catalogue.begin_job(&job.id).await?;
     under_way
         .told
         .send_modify(|told| told.state = JobState::Running);
     let ended = match job.kind {
-        JobKind::Ingest => ingesting::ingest(app, under_way).await?,
+        JobKind::Ingest => ingesting::ingest(app, under_way, lane).await?,
         JobKind::Blend => blending::blend(app, under_way).await?,
     };
     match ended {

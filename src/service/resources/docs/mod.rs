@@ -30,7 +30,7 @@ const POLICY: &str =
     ),
     paths(
         uploads::upload, paints::list, paints::show, paints::file, paints::measurement, paints::delete, visibility::change,
-        blends::create, blends::show, blend_bundles::bundle,
+        blends::create, blends::show, blends::delete, blend_bundles::bundle,
         readings::show, readings::table, readings::document, realisations::of_blend, realisations::of_paint,
         previews::of_blend, previews::of_paint, previews::create,
         environments::upload, environments::list, environments::show, environments::file, environments::delete,
