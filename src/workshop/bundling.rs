@@ -46,8 +46,7 @@ fn of_blend(blend: &Blend, profile: &Profile) -> Result<Made, WorkshopError> {
         },
         report: report.clone(),
     };
-    let bytes =
-        export::blend_bundle(blend, &about, &profile.export).map_err(WorkshopError::internal)?;
+    let bytes = export::blend_bundle(blend, &about, &profile.export)?;
     Ok(Made {
         bytes,
         report,

@@ -174,6 +174,15 @@ impl From<crate::blend::WeightError> for WorkshopError {
     }
 }
 
+impl From<crate::export::ExportError> for WorkshopError {
+    fn from(error: crate::export::ExportError) -> Self {
+        match error {
+            crate::export::ExportError::TooMany { .. } => Self::usage("paint", error),
+            error => Self::internal(error),
+        }
+    }
+}
+
 impl From<crate::paint::NotFinite> for WorkshopError {
     fn from(error: crate::paint::NotFinite) -> Self {
         Self::internal(error)

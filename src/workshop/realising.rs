@@ -13,7 +13,9 @@ use crate::accuracy::{
 };
 use crate::blend::{Blend, RealisationWeights};
 use crate::export::{self, About, ExportSettings};
-use crate::paint::{CarPaint, Clamp, Clustering, PaintFile, Provenance, Realisation, certify};
+use crate::paint::{
+    CarPaint, Clamp, Clustering, NAME_CHARACTERS, PaintFile, Provenance, Realisation, certify,
+};
 
 /// What a realisation is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
@@ -213,8 +215,7 @@ pub fn realise(
                 notes: chosen.notes,
             });
         }
-    }
-    .map_err(WorkshopError::internal)?;
+    }?;
     Ok(Made {
         bytes,
         report: chosen.report,
@@ -257,7 +258,7 @@ fn paint_file(chosen: &Chosen, error: &ResultError) -> PaintFile {
         realised_lab: error.lab,
     });
     PaintFile {
-        name: chosen.name.chars().take(200).collect(),
+        name: chosen.name.chars().take(NAME_CHARACTERS).collect(),
         provenance: chosen.provenance.clone(),
         energy: certify(&chosen.paint),
         paint: chosen.paint.clone(),

@@ -122,19 +122,16 @@ fn a_picture_takes_the_fewest_samples_that_are_enough() {
     assert!(met && (1..=1024).contains(&samples), "{samples}");
 }
 
-/// Coarse, since other tests run beside it; `tests/bench/estimates.rs` is the fine one.
+/// Bytes and error; what seconds are worth is measured by `tests/bench/estimates.rs`, beside nothing else.
 #[test]
-fn an_estimate_is_of_the_order_of_what_then_happens() {
+fn an_estimate_knows_the_bytes_and_the_error_of_what_then_happens() {
     let desk = Desk::new();
     let asked = ["blend", "sample:bmw339", "sample:ford_f8"];
     let estimate = [&["estimate"], &asked[..], &["--json"]].concat();
     let estimate = json(&desk.ok(&estimate).stdout);
-    let begun = std::time::Instant::now();
+    assert!(estimate["seconds"].as_f64().expect("seconds") > 0.0);
     let made = [&asked[..], &["--json", "--out", "x.blend"]].concat();
     let made = json(&desk.ok(&made).stdout);
-    let took = begun.elapsed().as_secs_f64();
-    let ratio = estimate["seconds"].as_f64().expect("seconds") / took;
-    assert!((0.2..5.0).contains(&ratio), "{estimate} {took}");
     let bytes = desk.read("x.blend").len() as f64;
     let ratio = estimate["bytes"].as_f64().expect("bytes") / bytes;
     assert!((0.8..1.25).contains(&ratio), "{estimate} {bytes}");
@@ -144,22 +141,19 @@ fn an_estimate_is_of_the_order_of_what_then_happens() {
     assert!((stated - lab).abs() < 1e-6, "{stated} {lab}");
 }
 
-/// As coarse. Of so few pixels getting ready takes longer than drawing with few samples, and less than with many.
+/// Both draw as many samples in all; of so few pixels nothing but their number tells drawing from getting ready.
 #[test]
 fn a_tiny_picture_of_many_samples_is_not_taken_for_a_large_one() {
     let desk = Desk::new();
-    let asked = [
-        "preview",
-        "sample:white",
-        "--size",
-        "8x8",
-        "--spp",
-        "4096",
-        "--json",
-    ];
-    let estimate = json(&desk.ok(&[&["estimate"], &asked[..]].concat()).stdout);
-    let begun = std::time::Instant::now();
-    desk.ok(&[&asked[..], &["--out", "p.png"]].concat());
-    let ratio = estimate["seconds"].as_f64().expect("seconds") / begun.elapsed().as_secs_f64();
-    assert!((0.1..10.0).contains(&ratio), "{estimate} {ratio}");
+    let estimate = |size, samples| {
+        let asked = ["estimate", "preview", "sample:white", "--json"];
+        let told = json(
+            &desk
+                .ok(&[&asked[..], &["--size", size, "--spp", samples]].concat())
+                .stdout,
+        );
+        told["seconds"].as_f64().expect("seconds")
+    };
+    let (tiny, small) = (estimate("8x8", "4096"), estimate("64x64", "64"));
+    assert!((0.05..20.0).contains(&(tiny / small)), "{tiny} {small}");
 }

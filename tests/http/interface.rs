@@ -54,7 +54,7 @@ async fn the_interface_is_the_committed_one_and_all_of_it_is_served() {
                 String::new()
             };
             assert!(
-                answer.status != 405 && kind != "/problems/unknown-address",
+                answer.status < 500 && answer.status != 405 && kind != "/problems/unknown-address",
                 "{method} {path} is documented and not served: {answer:?}"
             );
         }

@@ -255,7 +255,7 @@ async fn a_bug_is_a_500_that_says_nothing_but_its_request_id() {
         .ask(
             "POST",
             "/v1/paints",
-            &[("X-Request-Id", "mine-7")],
+            &[("X-Request-Id", "mine-7"), ("Prefer", "wait=60")],
             b"panic",
         )
         .await;

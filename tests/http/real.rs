@@ -161,8 +161,9 @@ async fn a_table_is_fitted_with_progress_and_its_fit_can_be_called_off() {
     let hash = blake3::hash(&bytes).to_hex().to_string();
     assert_eq!(paint["provenance"]["hashes"], json!([hash]));
 
+    let wait = [("Prefer", "wait=60")];
     let unknown = house
-        .ask("POST", "/v1/paints", &[], b"neither this nor that")
+        .ask("POST", "/v1/paints", &wait, b"neither this nor that")
         .await;
     let problem = unknown.problem(422, "unusable-measurement");
     assert_eq!(problem["pointer"], "/layout");

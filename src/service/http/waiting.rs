@@ -62,6 +62,15 @@ fn wait(preference: &str) -> Option<Duration> {
     }
 }
 
+/// The answer that work was taken on, with the job that does it.
+fn accepted(job: JobDocument, picked: Option<&Picked>) -> Answer {
+    let address = format!("/v1/jobs/{}", job.id);
+    let target = picked.map(TargetDocument::of);
+    Answer::json(&JobDocument { target, ..job }, Keep::Never)
+        .status(StatusCode::ACCEPTED)
+        .location(&address)
+}
+
 impl Prefer {
     /// The answer to who asked for what a job makes: the thing itself, the problem, or the job when it takes longer, with
     /// what was picked for a target.
@@ -83,7 +92,10 @@ impl Prefer {
         let begun = Instant::now();
         let job = runner::wait_for(app, job, self.wait.unwrap_or(UNASKED)).await?;
         let waited = begun.elapsed();
+        // Who does not wait gets the job, however far it came meanwhile.
+        let at_once = self.wait == Some(Duration::ZERO);
         let answer = match job.state {
+            _ if at_once => accepted(job, picked),
             JobState::Done => made().await?.status(StatusCode::CREATED).location(address),
             JobState::Failed => {
                 let told = job.problem.map(Problem::of_document);
@@ -97,13 +109,7 @@ impl Prefer {
                     "Somebody cancelled this while it was waited for.",
                 ));
             }
-            JobState::Queued | JobState::Running => {
-                let address = format!("/v1/jobs/{}", job.id);
-                let target = picked.map(TargetDocument::of);
-                Answer::json(&JobDocument { target, ..job }, Keep::Never)
-                    .status(StatusCode::ACCEPTED)
-                    .location(&address)
-            }
+            JobState::Queued | JobState::Running => accepted(job, picked),
         };
         let answer = answer.stage("job", waited);
         let applied = match self.wait {

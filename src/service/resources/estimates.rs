@@ -99,10 +99,22 @@ pub struct EstimateDocument {
 
 /// What is needed to estimate.
 enum Needed {
-    Ingest(LocalBlob, Option<Layout>),
+    Ingest(LocalBlob, Box<IngestOrder>),
     Blend(Vec<Arc<Shelved>>),
     Realise(Arc<Shelved>, Option<RealisationWeights>),
     Preview(Box<Picture>),
+}
+
+impl Needed {
+    /// The paints or the blend whose clusters are as they are.
+    fn things(&self) -> &[Arc<Shelved>] {
+        match self {
+            Self::Ingest(..) => &[],
+            Self::Blend(paints) => paints,
+            Self::Realise(of, _) => std::slice::from_ref(of),
+            Self::Preview(picture) => std::slice::from_ref(&picture.of),
+        }
+    }
 }
 
 /// A picture to estimate.
@@ -135,6 +147,11 @@ pub async fn create(
     let profile = order.profile.clone().unwrap_or_default().of_body()?;
     order.refuse_beside_the_point()?;
     let needed = order.needed(&app, &profile).await?;
+    if let Some(asked) = &order.profile {
+        for thing in needed.things() {
+            asked.fits(thing).map_err(Problem::in_body)?;
+        }
+    }
     let works = Arc::clone(&app.works);
     // The caller knows the paint, neither the file its upload is kept in nor the options it came with.
     let kept_in = match &needed {
@@ -164,7 +181,7 @@ pub async fn create(
             _ => None,
         };
         let environment = environment.transpose().map_err(Problem::in_body)?;
-        let done = order.with_asked(&needed, environment.as_deref(), &profile, estimate);
+        let done = order.with_asked(&needed, environment.as_deref(), estimate);
         done.map_err(told)
     });
     let (estimate, met) = estimated.await??;
@@ -273,7 +290,14 @@ impl EstimateOrder {
                 let layout = paint
                     .file_of_paint()
                     .and_then(|file| Layout::by_name(&file.provenance.source));
-                Ok(Needed::Ingest(local.ok_or_else(gone)?, layout))
+                // Of several paints in one document the name took this one.
+                let order = IngestOrder {
+                    name: paint.names.first().cloned(),
+                    layout,
+                    profile: *profile,
+                    ..IngestOrder::default()
+                };
+                Ok(Needed::Ingest(local.ok_or_else(gone)?, Box::new(order)))
             }
             WorkName::Blend => {
                 let most = app.config.limits.paints;
@@ -345,21 +369,13 @@ impl EstimateOrder {
         &self,
         needed: &Needed,
         environment: Option<&Environment>,
-        profile: &Profile,
         then: impl FnOnce(&Asked<'_>) -> T,
     ) -> T {
         match needed {
-            Needed::Ingest(local, layout) => {
-                let order = IngestOrder {
-                    layout: *layout,
-                    profile: *profile,
-                    ..IngestOrder::default()
-                };
-                then(&Asked::Ingest {
-                    upload: local.path(),
-                    order: &order,
-                })
-            }
+            Needed::Ingest(local, order) => then(&Asked::Ingest {
+                upload: local.path(),
+                order,
+            }),
             Needed::Blend(shelved) => {
                 let paints: Vec<&PaintFile> =
                     shelved.iter().filter_map(|p| p.file_of_paint()).collect();
