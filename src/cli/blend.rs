@@ -74,7 +74,7 @@ impl Blend {
         if json {
             let correspondence = &describe_blend(&made.blend)["correspondence"];
             return output::print_json(
-                &json!({ "out": self.out, "paints": names, "profile": options.profile.name(),
+                &json!({ "out": self.out.display().to_string(), "paints": names, "profile": options.profile.name(),
                     "correspondence": correspondence, "error": blend_error(&made.blend), "picked": picked,
                     "notes": made.notes }),
             );

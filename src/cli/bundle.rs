@@ -40,7 +40,7 @@ impl Bundle {
         output::replace(&self.out, &made.bytes)?;
         if json {
             return output::print_json(
-                &json!({ "out": self.out, "bytes": made.bytes.len(), "report": made.report }),
+                &json!({ "out": self.out.display().to_string(), "bytes": made.bytes.len(), "report": made.report }),
             );
         }
         eprintln!("{}: {} bytes", self.out.display(), made.bytes.len());

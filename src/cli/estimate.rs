@@ -77,7 +77,8 @@ enum What {
         #[arg(long, value_name = "FILE")]
         environment: Option<PathBuf>,
         /// Samples per pixel, in place of the profile's.
-        #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true)]
+        #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true,
+            conflicts_with_all = ["max_error", "max_seconds"])]
         spp: Option<u32>,
         #[command(flatten)]
         target: TargetArgs,
@@ -113,11 +114,14 @@ impl Estimate {
             .iter()
             .map(|s| format!("{} {:.3}", s.stage, s.seconds))
             .collect();
-        println!("profile: {}", estimate.profile);
-        println!("seconds: {:.3} ({})", estimate.seconds, stages.join(", "));
-        println!("bytes: {}", estimate.bytes);
-        println!("error: {}", estimate.error);
-        Ok(())
+        output::print(&format!(
+            "profile: {}\nseconds: {:.3} ({})\nbytes: {}\nerror: {}\n",
+            estimate.profile,
+            estimate.seconds,
+            stages.join(", "),
+            estimate.bytes,
+            estimate.error
+        ))
     }
 
     fn estimate(

@@ -79,7 +79,9 @@ impl Evaluate {
         bytes.push(b'\n');
         output::replace(&self.out, &bytes)?;
         if json {
-            return output::print_json(&json!({ "out": self.out, "pairs": pairs.pairs.len() }));
+            return output::print_json(
+                &json!({ "out": self.out.display().to_string(), "pairs": pairs.pairs.len() }),
+            );
         }
         eprintln!("{}: {} pairs", self.out.display(), pairs.pairs.len());
         Ok(())

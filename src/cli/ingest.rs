@@ -164,7 +164,7 @@ impl Ingest {
         stages.borrow().write(self.timings.as_deref())?;
         if json {
             return output::print_json(
-                &json!({ "out": self.out, "profile": options.profile.name(), "picked": picked, "paint": show::summary(&paint) }),
+                &json!({ "out": self.out.display().to_string(), "profile": options.profile.name(), "picked": picked, "paint": show::summary(&paint) }),
             );
         }
         made::notes(picked.as_ref(), &[]);

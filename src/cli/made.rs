@@ -56,7 +56,7 @@ pub fn tell(
 ) -> Result<(), WorkshopError> {
     if json {
         return output::print_json(
-            &json!({ "out": out, "bytes": made.bytes.len(), "report": made.report, "picked": picked }),
+            &json!({ "out": out.display().to_string(), "bytes": made.bytes.len(), "report": made.report, "picked": picked }),
         );
     }
     notes(picked, &made.notes);

@@ -56,7 +56,9 @@ impl Samples {
                 output::replace(out, &bytes)?;
                 drop(progress);
                 if json {
-                    return output::print_json(&json!({ "out": out, "bytes": bytes.len() }));
+                    return output::print_json(
+                        &json!({ "out": out.display().to_string(), "bytes": bytes.len() }),
+                    );
                 }
                 eprintln!("{}: {}", out.display(), sample.about);
                 Ok(())

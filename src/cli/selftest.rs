@@ -1,5 +1,7 @@
 //! `carpaint selftest`: the hard cases, quickly, on this machine and on a paint.
 
+use std::fmt::Write as _;
+
 use clap::Args;
 use serde::Serialize;
 
@@ -41,7 +43,7 @@ impl Selftest {
                 checks: &checks,
             })?;
         } else {
-            print_table(&checks);
+            print_table(&checks)?;
         }
         if failed == 0 {
             return Ok(());
@@ -54,15 +56,16 @@ impl Selftest {
     }
 }
 
-fn print_table(checks: &[Check]) {
+fn print_table(checks: &[Check]) -> Result<(), WorkshopError> {
     let widest = checks.iter().map(|c| c.case.len()).max().unwrap_or(0);
-    println!(
-        "{:widest$}  {:>9}  {:>7}  {:20}  verdict",
+    let mut table = format!(
+        "{:widest$}  {:>9}  {:>7}  {:20}  verdict\n",
         "case", "found", "limit", "unit"
     );
     for check in checks {
         let verdict = if check.passed { "ok" } else { "FAILED" };
-        println!(
+        let _ = writeln!(
+            table,
             "{:widest$}  {:>9}  {:>7}  {:20}  {verdict}",
             check.case,
             short(check.found),
@@ -70,6 +73,7 @@ fn print_table(checks: &[Check]) {
             check.unit
         );
     }
+    output::print(&table)
 }
 
 /// Two digits, or a whole number.

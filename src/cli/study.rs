@@ -46,7 +46,9 @@ impl Study {
             output::replace(&self.out.join(name), svg.as_bytes())?;
         }
         if json {
-            return output::print_json(&json!({ "out": self.out, "seconds": measured.seconds }));
+            return output::print_json(
+                &json!({ "out": self.out.display().to_string(), "seconds": measured.seconds }),
+            );
         }
         for front in &measured.fronts {
             eprintln!("{}: the knee is {}", front.work, front.knee);

@@ -63,7 +63,9 @@ impl Texels {
         let bytes = texels(&realised.paint, angles, size, self.seed, &options.limits)?;
         output::replace(&self.out, &bytes)?;
         if json {
-            return output::print_json(&json!({ "out": self.out, "bytes": bytes.len() }));
+            return output::print_json(
+                &json!({ "out": self.out.display().to_string(), "bytes": bytes.len() }),
+            );
         }
         eprintln!(
             "{}: {} x {} texels",

@@ -111,17 +111,19 @@ pub fn render(
     let (shader, plan) = shade::Shader::new(paint, scene);
     let [width, height] = scene.size;
     let done = AtomicU32::new(0);
-    let rows: Vec<Vec<vector::Vec3>> = (0..height)
+    let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
+    (0..height)
         .into_par_iter()
-        .map(|y| {
-            let row = (0..width).map(|x| shader.pixel(x, y, scene.seed)).collect();
+        .zip(pixels.par_chunks_exact_mut(width as usize))
+        .for_each(|(y, row)| {
+            for (x, pixel) in (0..width).zip(row) {
+                *pixel = shader.pixel(x, y, scene.seed);
+            }
             let rows = done.fetch_add(1, Ordering::Relaxed) + 1;
             #[allow(clippy::cast_precision_loss)]
             progress(rows as f32 / height as f32);
-            row
-        })
-        .collect();
-    let film = Film::new(width, height, scene.exposure, rows.concat());
+        });
+    let film = Film::new(width, height, scene.exposure, pixels);
     let report = RenderReport {
         sampling: noise::sampling_error(&shader, scene, Some(&film)),
         plan,
