@@ -23,6 +23,9 @@ if [ -z "${CARPAINT_PYTHON:-}" ] && [ -d "$CARPAINT_DATA" ]; then
     CARPAINT_PYTHON="$PWD/target/test-python/bin/python"
     if ! "$CARPAINT_PYTHON" -c 'import numpy' 2>/dev/null; then
       echo "installing NumPy into target/test-python"
+      if ! python3 -c 'import ensurepip' 2>/dev/null; then
+        { apt-get update -qq && apt-get install -y -qq python3-venv; } >/dev/null
+      fi
       python3 -m venv target/test-python
       "$CARPAINT_PYTHON" -m pip install --quiet --disable-pip-version-check numpy
     fi

@@ -114,11 +114,18 @@ fn room_files(room: &str) -> Vec<PathBuf> {
 /// The file without its tests: a test may use what it likes.
 fn code_of(path: &Path) -> String {
     let text = fs::read_to_string(path).expect("a readable source");
-    let code = text
-        .split("#[cfg(test)]\nmod ")
-        .next()
-        .unwrap_or_default()
-        .to_owned();
+    let mut parts = text.split("#[cfg(test)]\nmod ");
+    let code = parts.next().unwrap_or_default();
+    for tests in parts {
+        // Code that follows its tests would be looked at by nobody.
+        let after = tests.split_once("\n}\n").map_or("", |(_, after)| after);
+        let own_file = tests.lines().next().is_some_and(|line| line.ends_with(';'));
+        assert!(
+            own_file || after.trim().is_empty(),
+            "{}: code follows the tests",
+            path.display()
+        );
+    }
     let is_comment = |line: &&str| !line.trim_start().starts_with("//");
     code.lines()
         .filter(is_comment)
@@ -274,4 +281,43 @@ fn a_word_is_found_as_a_path_and_not_in_others() {
     ] {
         assert!(!IMPURE.iter().any(|word| names(code, word)), "{code}");
     }
+}
+
+/// What the image is built of holds every file that the program has in it.
+#[test]
+fn the_dockerfile_copies_what_the_program_includes() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let dockerfile = fs::read_to_string(root.join("docker/Dockerfile")).expect("a Dockerfile");
+    let copied: Vec<&str> = dockerfile
+        .lines()
+        .filter_map(|line| line.strip_prefix("COPY "))
+        .filter(|line| !line.starts_with("--from"))
+        .flat_map(|line| line.split_whitespace().rev().skip(1))
+        .collect();
+    let mut looked_at = 0;
+    for path in room_files("") {
+        let text = code_of(&path);
+        let folder = path.parent().expect("a folder");
+        for included in text.split("include_").skip(1) {
+            let Some(name) = included
+                .split_once("!(\"")
+                .and_then(|(_, rest)| rest.split_once('"'))
+                .map(|(name, _)| name)
+            else {
+                continue;
+            };
+            let file = fs::canonicalize(folder.join(name)).expect("an included file");
+            let file = file
+                .strip_prefix(fs::canonicalize(root).expect("the root"))
+                .expect("within the project");
+            looked_at += 1;
+            assert!(
+                copied.iter().any(|from| file.starts_with(from)),
+                "{} includes {}, which docker/Dockerfile does not copy",
+                path.display(),
+                file.display()
+            );
+        }
+    }
+    assert!(looked_at > 3, "{looked_at} files");
 }

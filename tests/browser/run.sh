@@ -3,8 +3,12 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 
-if ! command -v node >/dev/null; then
-  echo "the browser tests need Node.js 20 or newer" >&2
+if ! command -v npm >/dev/null; then
+  echo "installing Node.js"
+  { apt-get update -qq && apt-get install -y -qq nodejs npm; } >/dev/null
+fi
+if [ "$(node --print 'process.versions.node.split(".")[0] >= 20')" != true ]; then
+  echo "the browser tests need Node.js 20 or newer, this is $(node --version)" >&2
   exit 1
 fi
 if [ -z "${CHROMIUM:-}" ] && ! command -v chromium >/dev/null && ! command -v chromium-browser >/dev/null; then
