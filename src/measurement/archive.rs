@@ -2,7 +2,9 @@
 //!
 //! Any number of threads may read at once. Nothing but the archive's directory is kept; a file is read when it is asked
 //! for, and never more of it than the caller accepts, whatever the archive says about its size. Names come from the
-//! package itself and are not trusted: they never leave the folder.
+//! package itself and are not trusted: neither they nor links leave the folder.
+
+mod directory;
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -12,6 +14,8 @@ use std::sync::Arc;
 use bytes::Bytes;
 use zip::read::{ZipArchiveMetadata, ZipReadOptions};
 use zip::{CompressionMethod, ZipArchive};
+
+use directory::Directory;
 
 use super::package::PackageError;
 use crate::paint::Limits;
@@ -84,35 +88,6 @@ impl Source {
         };
         cursor.read_exact(into)
     }
-}
-
-/// How many files the record at the end of a zip archive announces, the large one (zip64) where there is one; 0 where
-/// there is none. APPNOTE 6.3.10, 4.3.14 and 4.3.16.
-fn announced_entries(archive: &mut Cursor) -> io::Result<u64> {
-    let whole = archive.length;
-    let mut tail = Vec::new();
-    archive.seek(SeekFrom::Start(whole.saturating_sub(22 + 65_535)))?;
-    archive.by_ref().take(22 + 65_535).read_to_end(&mut tail)?;
-    archive.seek(SeekFrom::Start(0))?;
-    let Some(at) = tail.windows(4).rposition(|four| four == b"PK\x05\x06") else {
-        return Ok(0);
-    };
-    let count = tail
-        .get(at + 10..at + 12)
-        .map_or(0, |two| u64::from(u16::from_le_bytes([two[0], two[1]])));
-    if count < 0xffff {
-        return Ok(count);
-    }
-    let number = |bytes: &[u8]| bytes.try_into().map_or(0, u64::from_le_bytes);
-    let locator = at.checked_sub(20).map(|from| &tail[from..at]);
-    let Some(locator) = locator.filter(|record| record.starts_with(b"PK\x06\x07")) else {
-        return Ok(count);
-    };
-    let mut record = Vec::new();
-    archive.seek(SeekFrom::Start(number(&locator[8..16])))?;
-    archive.by_ref().take(56).read_to_end(&mut record)?;
-    archive.seek(SeekFrom::Start(0))?;
-    Ok(record.get(32..40).map_or(count, number))
 }
 
 #[cfg(unix)]
@@ -193,10 +168,10 @@ impl Archive {
             });
         }
         // A directory of millions would be held in memory before it could be counted.
-        let announced = announced_entries(&mut cursor).map_err(|e| headless(&e))?;
-        if announced > limits.entries as u64 {
+        let announced = Directory::announced(&mut cursor, length).map_err(|e| headless(&e))?;
+        if announced.entries > limits.entries as u64 {
             return Err(PackageError::Entries {
-                count: usize::try_from(announced).unwrap_or(usize::MAX),
+                count: usize::try_from(announced.entries).unwrap_or(usize::MAX),
                 accepted: limits.entries,
             });
         }
@@ -210,8 +185,13 @@ impl Archive {
             });
         }
         if directory.has_duplicate_names() {
+            let mut cursor = Cursor::new(source).map_err(|e| archive(&e))?;
+            let name = announced.repeated(&mut cursor).map_err(|e| archive(&e))?;
             return Err(PackageError::Archive {
-                reason: "it holds two files of one name".into(),
+                reason: format!(
+                    "it holds two files of one name, {}",
+                    name.as_deref().unwrap_or("which its directory hides")
+                ),
             });
         }
         let mut index = std::collections::HashMap::with_capacity(directory.len());
@@ -339,7 +319,7 @@ impl Archive {
             }
             Self::Folder(folder) => {
                 let path = within(folder, name).ok_or_else(missing)?;
-                let file = File::open(path).map_err(|e| match e.kind() {
+                let file = open_within(folder, &path).map_err(|e| match e.kind() {
                     io::ErrorKind::NotFound => missing(),
                     _ => damaged(e.to_string()),
                 })?;
@@ -360,6 +340,18 @@ pub(super) const fn can_hold(packed: u64, bytes: u64) -> bool {
     bytes / 1032 <= packed
 }
 
+/// Opens a file that is in the folder when its links are followed, and that does not wait for a writer as a pipe does.
+fn open_within(folder: &Path, path: &Path) -> io::Result<File> {
+    let real = path.canonicalize()?;
+    if !real.starts_with(folder.canonicalize()?) {
+        return Err(io::Error::other("it is a link that leaves the folder"));
+    }
+    if !real.metadata()?.is_file() {
+        return Err(io::Error::other("it is no regular file"));
+    }
+    File::open(real)
+}
+
 /// Path of a name inside a folder; `None` for a name that would leave it.
 fn within(folder: &Path, name: &str) -> Option<PathBuf> {
     let name = Path::new(name);
@@ -370,53 +362,4 @@ fn within(folder: &Path, name: &str) -> Option<PathBuf> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_name_cannot_leave_the_folder() {
-        let folder = Path::new("/lab/silver");
-        assert_eq!(
-            within(folder, "flakes/00_00.exr"),
-            Some(folder.join("flakes/00_00.exr"))
-        );
-        for name in ["../blue/paint.json", "/etc/passwd", "flakes/../../x", ""] {
-            assert_eq!(within(folder, name), None, "{name}");
-        }
-    }
-
-    /// An archive of nothing that announces so many files.
-    fn announcing(count: u16, large: Option<u64>) -> Bytes {
-        let mut bytes = Vec::new();
-        if let Some(large) = large {
-            bytes.extend(b"PK\x06\x06");
-            bytes.extend([0; 28]);
-            bytes.extend(large.to_le_bytes());
-            bytes.extend([0; 16]);
-            bytes.extend(b"PK\x06\x07\0\0\0\0");
-            bytes.extend([0; 12]);
-        }
-        bytes.extend(b"PK\x05\x06\0\0\0\0");
-        bytes.extend(count.to_le_bytes());
-        bytes.extend(count.to_le_bytes());
-        bytes.extend([0; 10]);
-        bytes.into()
-    }
-
-    #[test]
-    fn files_are_counted_before_the_directory_is_read() {
-        for (count, large, announced) in [
-            (30_000, None, 30_000),
-            (0xffff, None, 0xffff),
-            (0xffff, Some(50_000_000), 50_000_000),
-        ] {
-            let archive = Archive::in_memory(announcing(count, large), &Limits::default());
-            assert!(
-                matches!(archive, Err(PackageError::Entries { count, .. }) if count == announced),
-                "{announced}"
-            );
-        }
-        let mut nothing = Cursor::new(Source::Memory(Bytes::from_static(b"PK"))).expect("opens");
-        assert_eq!(announced_entries(&mut nothing).expect("reads"), 0);
-    }
-}
+mod tests;

@@ -66,6 +66,9 @@ pub enum RglError {
         /// What would be accepted.
         accepted: &'static str,
     },
+    /// A density that is 0 everywhere: nothing would be reflected anywhere.
+    #[error("field {0} is 0 everywhere, accepted are densities that are above 0 somewhere")]
+    Empty(&'static str),
     /// A file whose colors are not multiplied by the warp's Jacobian.
     #[error("field jacobian is {0}, accepted is 1")]
     Jacobian(u8),

@@ -33,6 +33,7 @@ pub(super) fn finite<'f>(
             value: values[index],
             accepted,
         }),
+        None if density && values.iter().all(|&v| v == 0.0) => Err(RglError::Empty(name)),
         None => Ok((values, shape)),
     }
 }

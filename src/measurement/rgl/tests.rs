@@ -107,3 +107,21 @@ fn nothing_is_measured_below_the_horizon() {
             .is_some()
     );
 }
+
+#[test]
+fn a_density_without_any_is_named() {
+    let zero = [0.0; 32];
+    for empty in ["ndf", "sigma", "vndf"] {
+        let of = |name: &str| if name == empty { &zero } else { &[1.0; 32] };
+        let bytes = tensor_file(&[
+            ("theta_i", &[2], &[0.5, 1.0]),
+            ("phi_i", &[1], &[0.0]),
+            ("ndf", &[2, 2], &of("ndf")[..4]),
+            ("sigma", &[2, 2], &of("sigma")[..4]),
+            ("vndf", &[1, 2, 4, 4], of("vndf")),
+            ("rgb", &[1, 2, 3, 2, 2], &[0.5; 24]),
+        ]);
+        let told = RglMeasurement::read(&bytes).map(|_| ());
+        assert_eq!(told, Err(RglError::Empty(empty)));
+    }
+}
