@@ -46,7 +46,7 @@ pub fn glb(paint: &CarPaint, about: &About) -> Result<Vec<u8>, ExportError> {
     let textures = baked.as_ref().map(|baked| file.pictures(baked));
     let (mut shading, used) = material_json(&about.name, &material, textures);
     let lists = file.paint_lists(paint)?;
-    shading["extras"] = json!({ "carpaint": extras(paint, about, &report, &lists, mesh.radius) });
+    shading["extras"] = json!({ "carpaint": extras(paint, about, &report, &lists, &mesh) });
     let mut document = json!({
         "asset": { "version": "2.0", "generator": "carpaint" },
         "extensionsUsed": used,

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use super::About;
 use super::gltf_brdf::GltfMaterial;
 use super::gltf_fit::LossReport;
-use super::gltf_mesh::REPEATS;
+use super::gltf_mesh::Mesh;
 use super::numbers::{ANGLES, ANY, GRAIN, Number, PAINT, PROVENANCE, REPORT, documentation};
 use crate::paint::{CarPaint, RandomTexture, cell_spacing};
 
@@ -68,7 +68,7 @@ pub(super) fn extras(
     about: &About,
     loss: &LossReport,
     lists: &Map<String, Value>,
-    radius: f64,
+    mesh: &Mesh,
 ) -> Value {
     let table = &paint.color_table;
     let list = |name: &str| lists.get(name).cloned().unwrap_or_default();
@@ -88,7 +88,7 @@ pub(super) fn extras(
             "persistence_deg": texture.persistence_deg,
             "cell_spacing_texels": cell_spacing(texture.grain_um / texture.texel_um),
             "tile_um": tile_um,
-            "tiles_around_the_ball": REPEATS,
+            "tiles_around_the_ball": mesh.repeats,
         })
     });
     json!({
@@ -106,7 +106,7 @@ pub(super) fn extras(
             "overall": table.overall().to_rgb(),
         },
         "flakes": flakes,
-        "ball_radius_m": radius,
+        "ball_radius_m": mesh.radius,
         "loss": loss,
         "report": about.report,
         "documentation": documentation(&[PAINT, ANGLES, GRAIN, EXTRAS, REPORT, PROVENANCE]),

@@ -1,14 +1,15 @@
-//! The mesh that shows the material: a ball as large as makes its texels true.
+//! The mesh that shows the material: a ball with its texels in their true size.
 //!
-//! The baked tile goes eight times around the equator, so a ball of a paint with 20 µm texels is 13 mm wide: moved onto
-//! a car, the texture repeats as often as the uv says, and the flakes keep their size.
+//! It is half as large as the preview's: viewers average texels that are smaller than a pixel, where the preview draws
+//! them one by one, and from twice as near the same flakes stand out. The baked tile goes a whole number of times around
+//! the equator, which makes the ball a little smaller or larger than 20 mm. On another mesh the texture repeats as often as its uv say: flakes keep their size where a tile spans `tile_um`.
 
 use std::f64::consts::{PI, TAU};
 
-/// Times the tile goes around the equator; half as often from pole to pole.
-pub(super) const REPEATS: u32 = 8;
-/// Radius of a ball without texels, meters.
-const PLAIN_RADIUS: f64 = 0.05;
+/// Radius of the ball, meters.
+const RADIUS: f64 = 0.01;
+/// Most tiles from pole to pole: texels of a micrometre are no finer on a screen for being more.
+const MOST_PAIRS: f64 = 256.0;
 const AROUND: u16 = 64;
 const DOWN: u16 = 32;
 
@@ -21,11 +22,16 @@ pub(super) struct Mesh {
     pub triangles: Vec<u16>,
     /// Radius in meters.
     pub radius: f64,
+    /// Times the tile goes around the equator; half as often from pole to pole.
+    pub repeats: u32,
 }
 
 /// A ball whose uv repeat a tile of `tile_um` micrometres; `None` for a paint without texels.
 pub(super) fn ball(tile_um: Option<f64>) -> Mesh {
-    let radius = tile_um.map_or(PLAIN_RADIUS, |um| f64::from(REPEATS) * um * 1e-6 / TAU);
+    let tile = tile_um.map_or(TAU * RADIUS, |um| um * 1e-6);
+    // As many from pole to pole as there are, whole too.
+    let pairs = (PI * RADIUS / tile).round().clamp(1.0, MOST_PAIRS);
+    let (repeats, radius) = (2.0 * pairs, 2.0 * pairs * tile / TAU);
     let mut mesh = Mesh {
         positions: Vec::new(),
         normals: Vec::new(),
@@ -33,6 +39,8 @@ pub(super) fn ball(tile_um: Option<f64>) -> Mesh {
         uv: Vec::new(),
         triangles: Vec::new(),
         radius,
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most twice MOST_PAIRS
+        repeats: repeats as u32,
     };
     let narrow = |v: f64| {
         #[allow(clippy::cast_possible_truncation)] // glTF's precision
@@ -49,7 +57,6 @@ pub(super) fn ball(tile_um: Option<f64>) -> Mesh {
             mesh.positions.push(normal.map(|c| narrow(radius * c)));
             mesh.normals.push(normal.map(narrow));
             mesh.tangents.push([cosine, 0.0, -sine, 1.0].map(narrow));
-            let repeats = f64::from(REPEATS);
             mesh.uv.push([repeats * u, repeats / 2.0 * v].map(narrow));
         }
     }
@@ -102,9 +109,20 @@ mod tests {
 
     #[test]
     fn the_uv_of_a_texel_span_a_texel() {
-        let tile_um = 256.0 * 20.0;
-        let mesh = ball(Some(tile_um));
-        let around = TAU * mesh.radius;
-        assert!((around / f64::from(REPEATS) - tile_um * 1e-6).abs() < 1e-12);
+        for texel_um in [0.5, 4.0, 20.0, 39.0, 400.0] {
+            let tile_um = 256.0 * texel_um;
+            let mesh = ball(Some(tile_um));
+            let around = TAU * mesh.radius;
+            assert!((around / f64::from(mesh.repeats) - tile_um * 1e-6).abs() < 1e-12);
+            let last = mesh.uv.last().expect("vertices");
+            let repeats = mesh.repeats as f32;
+            assert_eq!(*last, [repeats, repeats / 2.0]);
+        }
+        let ball = ball(Some(256.0 * 20.0));
+        assert!(
+            (ball.radius - RADIUS).abs() < 0.1 * RADIUS,
+            "{}",
+            ball.radius
+        );
     }
 }

@@ -81,8 +81,10 @@ pub(super) fn write<T: Step>(probability: &[f64], luminance: &[f64], steps: &mut
         } else {
             ((cumulative * count + 0.5) as usize).clamp(next, STEPS)
         };
-        for at in (next..end).step_by(RUN) {
+        let mut at = next;
+        while at < end {
             row[at..at + RUN].copy_from_slice(&[T::of(k); RUN]);
+            at += RUN;
         }
         let share = (end - next) as f64 * width;
         next = end;
