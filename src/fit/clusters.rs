@@ -3,8 +3,8 @@
 //! A slice's texels are few bright ones over a dark crowd, and the bright ones are the sparkle. The brightest two dozen
 //! of 4096 texels get small clusters of their own: 1, 1 and 1, then the 3 around the 99.9th percentile, where sparkle is
 //! judged, then 2, 2, 4 and 8, in proportion for other sizes. Where the cluster around the percentile holds few texels it
-//! is the color of its middle one: a step of the histogram there would make the percentile of any finite drawing jump.
-//! What that takes from the mean the brighter ones give back. The rest is split where the squared distance from the
+//! is the color there, between those of two texels as a percentile is read: a step of the histogram would make the
+//! percentile of any finite drawing jump. What that takes from the mean the brighter ones give back. The rest is split where the squared distance from the
 //! clusters' means is largest: at the mean of the axis that spreads most, or, along lightness, where the split lowers the
 //! sum of squares most. A leaf's box then follows one of two rules:
 //!
@@ -22,8 +22,9 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::boxes::{BoxRule, Corners, Members};
+use super::boxes::{BoxRule, Corners, Members, of_moments};
 use super::texels::{Texel, linear, take_in};
+use crate::color::Lab;
 use brightest::{SPARKLE, bright_groups, brightest_last};
 use crowd::Crowd;
 
@@ -150,18 +151,19 @@ impl Clusterer {
         rule: BoxRule,
     ) -> Vec<(Members, Corners)> {
         let light = self.light.as_slice();
-        // The leaf around the 99.9th percentile, where it is small.
-        let sparkle = crowd + (SPARKLE * self.texels.len() as f64) as usize;
+        // The leaf around the 99.9th percentile, where it is small: the texels before and after it.
+        let rank = SPARKLE * (self.texels.len() as f64 - 1.0);
+        let [before, after] = [rank.floor(), rank.ceil()].map(|k| crowd + k as usize);
         let flat = leaves
             .iter()
-            .position(|leaf| leaf.contains(&sparkle) && leaf.len() <= FLAT);
-        let (mut owed, mut brighter) = ([0.0; 3], 0);
+            .position(|leaf| leaf.contains(&before) && leaf.contains(&after) && leaf.len() <= FLAT);
+        let (mut sparkle, mut owed, mut brighter) = ([0.0; 3], [0.0; 3], 0);
         if let Some(flat) = flat {
-            let members = &self.texels[leaves[flat].clone()];
-            let middle = linear(&members[members.len() / 2], light);
-            for texel in members {
+            let [more, less] = [before, after].map(|k| linear(&self.texels[k], light));
+            sparkle = std::array::from_fn(|k| more[k] + (less[k] - more[k]) * rank.fract());
+            for texel in &self.texels[leaves[flat].clone()] {
                 let own = linear(texel, light);
-                (0..3).for_each(|k| owed[k] += own[k] - middle[k]);
+                (0..3).for_each(|k| owed[k] += own[k] - sparkle[k]);
             }
             brighter = leaves[flat].start - crowd;
         }
@@ -171,7 +173,7 @@ impl Clusterer {
             let corners = match rule {
                 BoxRule::Tight => members.hull,
                 BoxRule::Moments if Some(number) == flat && brighter > 0 => {
-                    Members::of(&texels[texels.len() / 2..][..1], light).moments([0.0; 3])
+                    of_moments(Lab::from_rgb(sparkle).to_array(), [0.0; 3], sparkle)
                 }
                 BoxRule::Moments if flat.is_some_and(|flat| number < flat) => {
                     members.moments(owed.map(|o| o / brighter as f64))

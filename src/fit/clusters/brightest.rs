@@ -20,7 +20,11 @@ pub(super) fn by_lightness(x: &Texel, y: &Texel) -> Ordering {
 pub(super) fn bright_groups(count: usize, groups: usize) -> Vec<usize> {
     let rank = SPARKLE * (count as f64 - 1.0);
     let (middle, reach) = (rank.round() as usize, (0.3 * rank).round() as usize);
-    let (from, to) = (middle - reach, middle + reach + 1);
+    let (mut from, mut to) = (middle - reach, middle + reach + 1);
+    if rank >= 1.0 {
+        // The percentile lies between two texels: both belong to the cluster around it.
+        (from, to) = (from.min(rank as usize), to.max(rank.ceil() as usize + 1));
+    }
     let mut ends = match groups {
         0..3 => Vec::new(),
         3..6 => vec![from, to],

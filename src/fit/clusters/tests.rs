@@ -122,7 +122,16 @@ fn percentile(sorted: &[f64], share: f64) -> f64 {
 
 #[test]
 fn the_mean_is_exact_and_the_sparkle_is_kept() {
-    for (count, salt) in [(4096, 1), (4096, 20), (2304, 40), (9216, 60), (16384, 80)] {
+    for (count, salt) in [
+        (1089, 10),
+        (1600, 30),
+        (2304, 40),
+        (3136, 50),
+        (4096, 1),
+        (4096, 20),
+        (9216, 60),
+        (16384, 80),
+    ] {
         let pixels = sparkling(count, salt);
         let clusters = cluster(&pixels);
         assert_mean(&clusters, &pixels);
