@@ -16,8 +16,8 @@ use super::optics::{CoatKernel, Half, LEAST_COSINE, beckmann_half, mirrored};
 use super::vector::{Vec3, along, mix, scale};
 use crate::paint::{CarPaint, FlakeSampler, MIN_ALPHA, QuickBracket, QuickGrid, Reflectance};
 
-/// Lobes narrower than this are also drawn by their own shape; wider ones are served by drawing lights alone.
-const NARROW: f64 = 0.06;
+/// Lobes that look narrower than this are also drawn by their own shape; wider ones are served by drawing lights alone.
+const NARROW: f32 = 0.05;
 
 /// A paint prepared for shading.
 #[derive(Debug)]
@@ -30,8 +30,8 @@ pub(super) struct Kernel<'a> {
     coat: CoatKernel,
     flakes: Option<FlakeSampler<'a>>,
     cosine_share: f32,
-    /// Whether drawing directions by the paint's own shape pays.
-    pub(super) draws: bool,
+    /// Cosine of the view up to which a lobe looks narrow: towards grazing its image shrinks with the cosine.
+    narrow_below: f32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -51,6 +51,8 @@ pub(super) struct View {
     pub(super) outer: Lanes3,
     inner: Lanes3,
     transmission: Lanes,
+    /// Whether drawing directions by the paint's own shape pays.
+    pub(super) draws: bool,
 }
 
 /// Paint towards one light.
@@ -95,6 +97,12 @@ impl<'a> Kernel<'a> {
         for lobe in &mut lobes {
             lobe.share *= (rest - cosine_share) / total.max(f32::MIN_POSITIVE);
         }
+        let narrow_below = if coat.mirror {
+            let narrowest = lobes.iter().map(|lobe| lobe.alpha2.sqrt());
+            NARROW / narrowest.fold(f32::INFINITY, f32::min)
+        } else {
+            f32::INFINITY
+        };
         Self {
             diffuse: paint.diffuse.map(|a| a as f32 / PI),
             lobes,
@@ -108,23 +116,26 @@ impl<'a> Kernel<'a> {
             coat,
             flakes: paint.flakes.as_ref().map(FlakeSampler::new),
             cosine_share,
-            draws: !coat.mirror || present().any(|lobe| lobe.alpha < NARROW),
+            narrow_below,
         }
     }
 
     pub(super) fn view<const COATED: bool>(&self, outer: Lanes3) -> View {
         let outer = [outer[0], outer[1], outer[2].at_least(LEAST_COSINE)];
-        if !COATED {
-            return View {
-                outer,
-                inner: outer,
-                transmission: Lanes::splat(1.0),
-            };
-        }
+        let inner = if COATED {
+            self.coat.refract(outer)
+        } else {
+            outer
+        };
         View {
             outer,
-            inner: self.coat.refract(outer),
-            transmission: -self.coat.fresnel(outer[2]) + 1.0,
+            inner,
+            transmission: if COATED {
+                -self.coat.fresnel(outer[2]) + 1.0
+            } else {
+                Lanes::splat(1.0)
+            },
+            draws: inner[2].0.iter().any(|&z| z < self.narrow_below),
         }
     }
 
@@ -176,7 +187,7 @@ impl<'a> Kernel<'a> {
             let shape = d * masking * (schlick * (1.0 - lobe.f0) + lobe.f0);
             sum = std::array::from_fn(|k| sum[k] + shape * lobe.weight[k]);
         }
-        if self.draws {
+        if view.draws {
             density = density + drawn * half.h_z * compression / half.h_o * (0.25 / PI);
         }
         let theta_h = Lanes::quadrant_deg(half.across, half.h_z);

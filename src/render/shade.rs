@@ -260,7 +260,7 @@ impl<'a> Shader<'a> {
                     density.0[k] = drawn.density;
                 }
                 let light = batch.local(directions);
-                if self.kernel.draws {
+                if view.draws {
                     shine(
                         light,
                         times(power, density),
@@ -276,7 +276,7 @@ impl<'a> Shader<'a> {
                     );
                 }
             }
-            if self.kernel.draws {
+            if view.draws {
                 let (mut light, mut power) = (splat3([0.0, 0.0, 1.0]), splat3([0.0; 3]));
                 let mut density = Lanes::splat(1.0);
                 for (k, &facing) in facing.iter().enumerate().take(batch.count) {

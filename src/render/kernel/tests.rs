@@ -133,7 +133,7 @@ fn integrated<const COATED: bool>(kernel: &Kernel<'_>, view: &View, steps: u32) 
 fn assert_drawn_by_density<const COATED: bool>(paint: &CarPaint, height: f64) {
     const DRAWS: u32 = 1 << 16;
     let mut kernel = Kernel::new(paint);
-    kernel.draws = true;
+    kernel.narrow_below = f32::INFINITY;
     let view = kernel.view::<COATED>(single(direction(height, 0.3)));
     let points = super::super::points::Points::of_pixel(0, 0, DRAWS, 5);
     let mut counts = [0.0_f64; 64];
@@ -198,7 +198,7 @@ fn drawn_directions_have_their_stated_density() {
             thickness_um: None,
         }));
         let mut kernel = Kernel::new(&paint);
-        kernel.draws = true;
+        kernel.narrow_below = f32::INFINITY;
         let wo = direction(0.7, 0.0);
         let view = kernel.view::<true>(single(wo));
         let points = super::super::points::Points::of_pixel(0, 0, 1 << 16, 5);
