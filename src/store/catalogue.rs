@@ -1,4 +1,4 @@
-//! The catalogue: which paints, blends and panoramas there are, and which jobs are to be done.
+//! The catalogue: which paints, blends and environments there are, and which jobs are to be done.
 //!
 //! Records are names, hashes and opaque JSON. Four small traits, one per resource; [`Catalogue`] is all of them.
 
@@ -68,7 +68,7 @@ pub struct BlendRecord {
     pub blend: Hash,
 }
 
-/// A panorama that was uploaded.
+/// An environment that was uploaded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EnvironmentRecord {
     /// Address.
@@ -209,18 +209,18 @@ pub trait Blends: Send + Sync {
     fn remove_blend<'a>(&'a self, id: &'a str) -> Task<'a, Option<BlendRecord>>;
 }
 
-/// Panoramas on record.
+/// Environments on record.
 pub trait Environments: Send + Sync {
-    /// Adds a panorama; `false` when its id is there already, which changes nothing.
+    /// Adds an environment; `false` when its id is there already, which changes nothing.
     fn add_environment<'a>(&'a self, environment: &'a EnvironmentRecord) -> Task<'a, bool>;
 
-    /// The panorama of this id.
+    /// The environment of this id.
     fn environment<'a>(&'a self, id: &'a str) -> Task<'a, Option<EnvironmentRecord>>;
 
-    /// Up to `limit` panoramas from `cursor` on.
+    /// Up to `limit` environments from `cursor` on.
     fn environments(&self, cursor: Option<i64>, limit: u32) -> Task<'_, EnvironmentPage>;
 
-    /// Removes a panorama and hands out what was on record.
+    /// Removes an environment and hands out what was on record.
     fn remove_environment<'a>(&'a self, id: &'a str) -> Task<'a, Option<EnvironmentRecord>>;
 }
 
@@ -261,7 +261,7 @@ pub trait Catalogue: Paints + Blends + Environments + JobBook {
     /// Ties a key to a subject unless it is tied, and says to which. Beyond `keep` keys the oldest are forgotten.
     fn tie_key<'a>(&'a self, key: &'a str, subject: &'a str, keep: u32) -> Task<'a, String>;
 
-    /// Whether a paint, a blend, a panorama or the request of an unfinished job names this blob.
+    /// Whether a paint, a blend, an environment or the request of an unfinished job names this blob.
     fn names_blob(&self, blob: Hash) -> Task<'_, bool>;
 }
 

@@ -302,7 +302,7 @@ fn new_job(id: &str, subject: &str, request: &str) -> NewJob {
     }
 }
 
-/// What [`Environments`] promises, on a catalogue without panoramas.
+/// What [`Environments`] promises, on a catalogue without environments.
 async fn environments_conform(catalogue: &dyn Catalogue) {
     let sky = EnvironmentRecord {
         id: "e_1".to_owned(),

@@ -99,7 +99,8 @@ pub fn ingest(
 }
 
 /// The same, telling `ended` the name of each stage when it is over: `open`, `hash`, `base`, `flakes`, `error` (what the
-/// clusters miss of the pictures), `certificate`; `base` after `flakes` where it is fitted to readings. Stages that a measurement does not need are not told.
+/// clusters miss of the pictures), `certificate`; `base` after `flakes` where it is fitted to readings. Stages that a
+/// measurement does not need are not told.
 ///
 /// # Errors
 ///

@@ -1,8 +1,9 @@
 //! What holds for every request, whatever it is about.
 //!
-//! Each passes the `envelope` (id, time, counts, panics); browsers are told by `origins` whose pages may call. What it says is read strictly in `extract` and `query`, and
-//! what it prefers in `waiting` and `idempotency`, and an upload comes in through `receiving`; what is wrong with it becomes a problem in `problem`, which says what
-//! is `accepted` instead, and all else an `answer` with an `ETag` and how long it keeps.
+//! Each passes the `envelope` (id, time, counts, panics); browsers are told by `origins` whose pages may call. What it
+//! says is read strictly in `extract` and `query`, what it prefers in `waiting` and `idempotency`, and an upload comes in
+//! through `receiving`. What is wrong with it becomes a problem in `problem`, which says what is `accepted` instead, and
+//! all else an `answer` with an `ETag` and how long it keeps.
 //!
 //! Promised: unknown fields and parameters are refused; nothing internal leaves in an error. Left to others: what a
 //! request is about (`resources`).

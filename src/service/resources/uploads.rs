@@ -104,9 +104,9 @@ impl IngestQuery {
 ///
 /// The body is the file itself: a measured-paint package (.zip), an RGL `.bsdf`, an MPI 2005 table, a MERL binary, readings
 /// of a multi-angle instrument as CSV (what `readings.csv` of a paint is, or with `nm400` to `nm700` in place of `L,a,b`) or
-/// `CxF3`, or a `.paint`. Readings alone make a paint that reads the same and has no flakes. It is streamed to disk. The same bytes with the same options have the same id: asking again is safe, and
-/// answers at once. `Prefer: wait=N` waits up to N seconds for the paint; otherwise what takes more than 3 seconds is
-/// answered with the job that goes on.
+/// `CxF3`, or a `.paint`. Readings alone make a paint that reads the same and has no flakes. It is streamed to disk. The
+/// same bytes with the same options have the same id: asking again is safe, and answers at once. `Prefer: wait=N` waits up
+/// to N seconds for the paint; otherwise what takes more than 3 seconds is answered with the job that goes on.
 #[utoipa::path(
     post, operation_id = "upload_paint", path = "/v1/paints", tag = "paints", params(IngestQuery,
         ("Prefer" = Option<String>, Header, description = "`wait=N` seconds, or `respond-async`"),

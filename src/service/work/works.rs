@@ -1,4 +1,4 @@
-//! What the service asks of the workshop: four pieces of work, synchronous and computing.
+//! What the service asks of the workshop: synchronous work that computes.
 
 use std::fmt::Debug;
 use std::path::Path;

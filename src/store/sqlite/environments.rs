@@ -1,4 +1,4 @@
-//! Panoramas in SQLite.
+//! Environments in SQLite.
 
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
