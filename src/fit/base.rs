@@ -4,6 +4,8 @@
 //! brings the result clearly nearer to the measurement, or when the bare fit misses its aim and the coat helps:
 //! a second, wide lobe must not become a coat for a per cent.
 
+mod guesses;
+
 use super::color_table::{Frame, TableFit, fit_color_table};
 use super::directions::{TRUSTED_DEG, measure};
 use super::lobes::{CoatSearch, Shape, fit_shape, unit_of};
@@ -14,6 +16,7 @@ use crate::measurement::MeasuredBrdf;
 use crate::paint::{
     CarPaint, Chi, Coat, ColorTable, Direction, FitResiduals, Lobe, MAX_WEIGHT, Reflectance,
 };
+use guesses::held_to_energy;
 
 /// Samples that the shape is fitted to.
 const SAMPLES: usize = 8000;
@@ -97,8 +100,7 @@ pub enum FitError {
 /// One way to explain the measurement.
 struct Candidate {
     shape: Shape,
-    table: ColorTable,
-    mapped: usize,
+    fitted: TableFit,
     /// Errors of the fit and of its lobes alone, over the floor's: lower is better.
     score: f64,
     /// Worst error away from the mirror over the floor's.
@@ -190,7 +192,7 @@ pub fn fit_base_telling(
             best = other;
         }
     }
-    finish(best, &judge)
+    finish(best, &judge, frame)
 }
 
 fn candidate(
@@ -223,8 +225,7 @@ fn candidate(
         .max(AIM * ratios[5] / 1.4);
     Candidate {
         shape,
-        table: fitted.table,
-        mapped: fitted.mapped,
+        fitted,
         score,
         worst,
     }
@@ -249,7 +250,7 @@ fn paint_of(shape: &Shape, color_table: ColorTable) -> CarPaint {
     }
 }
 
-fn finish(best: Candidate, judge: &Judge) -> Result<FittedBase, FitError> {
+fn finish(best: Candidate, judge: &Judge, frame: Frame) -> Result<FittedBase, FitError> {
     let shape = best.shape;
     for (field, value) in [("diffuse", shape.diffuse)]
         .into_iter()
@@ -266,13 +267,28 @@ fn finish(best: Candidate, judge: &Judge) -> Result<FittedBase, FitError> {
             shape.starts
         ));
     }
-    if best.mapped > 0 {
+    let TableFit {
+        table,
+        mapped,
+        guessed,
+    } = best.fitted;
+    if mapped > 0 {
         warnings.push(format!(
-            "{} colors of the color table lay outside sRGB and became the nearest color inside",
-            best.mapped
+            "{mapped} colors of the color table lay outside sRGB and became the nearest color inside"
         ));
     }
-    let paint = paint_of(&shape, best.table);
+    let mut paint = paint_of(&shape, table);
+    // Inside a coat light never comes to graze.
+    if frame == Frame::Air
+        && let Some(held) = held_to_energy(&paint, &guessed)
+    {
+        paint = held;
+        warnings.push(
+            "at grazing angles, where nothing was measured, the color was made paler until the paint gives back no more \
+             light than it gets"
+                .to_owned(),
+        );
+    }
     let reflectance = Reflectance::new(&paint);
     let residuals = judge.residuals(|wi, wo| reflectance.evaluate(wi, wo, Chi::Table));
     let all = &residuals.all;

@@ -61,6 +61,8 @@ pub(super) struct TableFit {
     pub table: ColorTable,
     /// Nodes brought into the gamut.
     pub mapped: usize,
+    /// Which nodes have a color of their neighbours, for nothing was measured there.
+    pub guessed: Vec<bool>,
 }
 
 /// The grid's angles, those of the instruments among them.
@@ -376,7 +378,11 @@ pub(super) fn fit_color_table(
     let labs: Vec<Lab> = colors.iter().map(lab).collect();
     let table = ColorTable::new(grid(rows), grid(columns), labs, lab(&overall))
         .unwrap_or_else(|_| ColorTable::white());
-    TableFit { table, mapped }
+    TableFit {
+        table,
+        mapped,
+        guessed: nodes.iter().map(|node| node.color.is_none()).collect(),
+    }
 }
 
 #[cfg(test)]
