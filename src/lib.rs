@@ -27,6 +27,12 @@
 //! Rooms up to [`accuracy`] are pure: no clock, no network, no files, no chance; the same arguments give the same bytes
 //! on any number of threads. Which room may use which stands in `tests/architecture.rs`, where it is tested.
 
+// A realisation makes and drops megabytes. glibc hands their pages back and asks for new ones, which the kernel clears
+// each time: two fifths of a bundle's time in `tests/bench/ratios.rs`. It stands here and not in `main`, so that benches
+// and tests run on what the program runs on. Huge pages are left out: clearing one costs a short command more than it saves.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 pub mod accuracy;
 pub mod blend;
 pub mod cli;

@@ -26,9 +26,8 @@ pub struct Serve {
     /// Folder for catalogue, uploads and results; created if it is not there.
     #[arg(long, value_name = "DIR", default_value = "carpaint-data")]
     data: PathBuf,
-    /// Another address whose pages may ask for paints from a browser, such as `https://cars.example`;
-    /// `*` is all of them.
-    /// May be given several times. They read and make; none of them changes or deletes.
+    /// Another address whose pages may ask for paints from a browser, such as `https://cars.example`; `*` is all of
+    /// them. May be given several times. They read and make; none of them changes or deletes.
     #[arg(long, value_name = "ORIGIN")]
     allow_origin: Vec<Origin>,
     /// Do not load the sample paints.

@@ -78,6 +78,7 @@ impl Textures {
         self.push("inverse_cdf", "png", bytes, entry);
         Ok(())
     }
+
     /// The steps of all slices, slice after slice, and what each loses.
     fn steps<T: Step>(&mut self, flakes: &Flakes, luminances: &[f64], texels: usize) -> Vec<T> {
         let mut index = vec![T::of(0); texels];

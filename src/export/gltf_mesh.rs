@@ -2,7 +2,9 @@
 //!
 //! It is half as large as the preview's: viewers average texels that are smaller than a pixel, where the preview draws
 //! them one by one, and from twice as near the same flakes stand out. The baked tile goes a whole number of times around
-//! the equator, which makes the ball a little smaller or larger than 20 mm. On another mesh the texture repeats as often as its uv say: flakes keep their size where a tile spans `tile_um`.
+//! the equator, at least twice and at most 512 times, which makes the ball a little smaller or larger than 20 mm for tiles
+//! of 0.2 to 20 mm, and as small or large as they are beyond. On another mesh the texture repeats as often as its uv say:
+//! flakes keep their size where a tile spans `tile_um`.
 
 use std::f64::consts::{PI, TAU};
 

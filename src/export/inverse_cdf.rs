@@ -19,10 +19,6 @@ pub struct InverseCdf {
 }
 
 /// The inverse distribution of a slice of clusters with these probabilities and mean luminances.
-///
-/// # Panics
-///
-/// Never for a slice of at least one cluster.
 #[must_use]
 pub fn inverse_cdf(probability: &[f64], luminance: &[f64]) -> InverseCdf {
     let mut steps = vec![0; STEPS];

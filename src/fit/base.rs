@@ -284,8 +284,8 @@ fn finish(best: Candidate, judge: &Judge, frame: Frame) -> Result<FittedBase, Fi
     {
         paint = held;
         warnings.push(
-            "at grazing angles, where nothing was measured, the color was made paler until the paint gives back no more \
-             light than it gets"
+            "where nothing was measured the color was made paler, and darker if need be, until the paint gives back no \
+             more light than it gets"
                 .to_owned(),
         );
     }

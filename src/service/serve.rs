@@ -183,7 +183,7 @@ pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = (
     }
     drop(listener);
     app.stop();
-    // Nobody holds the data folder any more when this returns.
+    // It does not hold the data folder any longer.
     let _ = tidying.await;
     let grace = app.config.grace;
     let _ = tokio::time::timeout(grace, async {

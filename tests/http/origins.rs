@@ -96,6 +96,14 @@ async fn a_page_of_another_address_makes_nothing_unless_it_was_named() {
             "what cannot be read back may be asked for"
         );
     }
+    // Where a browser does not trust the address it says the origin alone.
+    let plain = [("origin", other), ("prefer", "wait=60")];
+    let upload = house.ask("POST", "/v1/paints", &plain, b"silver").await;
+    upload.problem(403, "other-origin");
+    let own = format!("http://{}", house.address);
+    let own = [("origin", own.as_str()), ("prefer", "wait=60")];
+    let upload = house.ask("POST", "/v1/paints", &own, b"green").await;
+    assert_eq!(upload.status, 201, "{upload:?}");
     for origin in [other, SHOP] {
         let gone = house
             .ask("DELETE", &path, &page("cross-site", origin), b"")

@@ -1,6 +1,6 @@
 //! Colors where nothing was measured, held to what light there is.
 //!
-//! Next to grazing no goniometer reads, and a node of the color table there takes its neighbours' color. The lobes' Fresnel
+//! Next to grazing no goniometer reads, and nodes of the color table there take their neighbours' color. The lobes' Fresnel
 //! factor goes on rising to 1 meanwhile, so that a deeply colored film would come to give back more light than it gets,
 //! in that color. What it does give back at grazing is reflected by its surface, which is colorless. The guessed nodes
 //! are moved towards gray of the same luminance, as little as makes the energy certificate hold, and where gray is too

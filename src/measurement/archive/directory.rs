@@ -11,6 +11,9 @@ const LARGE_END: &[u8] = b"PK\x06\x06";
 const LARGE_LOCATOR: &[u8] = b"PK\x06\x07";
 const FILE: &[u8] = b"PK\x01\x02";
 
+/// Bytes of a directory that a name is looked for in.
+const LONGEST: u64 = 16 << 20;
+
 /// What the end of an archive says about its directory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Directory {
@@ -27,38 +30,43 @@ impl Directory {
     pub(super) fn announced(archive: &mut (impl Read + Seek), whole: u64) -> io::Result<Self> {
         let from = whole.saturating_sub(22 + 65_535);
         let tail = bytes_at(archive, from, 22 + 65_535)?;
-        let Some(at) = tail.windows(4).rposition(|four| four == END) else {
-            return Ok(Self::default());
-        };
-        let end = &tail[at..];
-        let (entries, length) = (number(end, 10, 2), number(end, 12, 4));
-        let place = from + at as u64;
-        let small = Self {
+        let ends = tail.windows(22).enumerate();
+        let ends = ends.filter(|(_, record)| record.starts_with(END));
+        let mut most = Self::default();
+        // A comment may look like an end: whichever a reader takes, it announces no more than the largest of them.
+        for (at, end) in ends {
+            let place = from + at as u64;
+            let small = Self::before(place, number(end, 10, 2), number(end, 12, 4));
+            let locator = at.checked_sub(20).map(|from| &tail[from..at]);
+            let locator = locator.filter(|record| record.starts_with(LARGE_LOCATOR));
+            let large = locator.map(|locator| Self::large(archive, number(locator, 8, 8)));
+            for found in [Some(small), large.transpose()?.flatten()] {
+                most = found
+                    .filter(|found| found.entries >= most.entries)
+                    .unwrap_or(most);
+            }
+        }
+        Ok(most)
+    }
+
+    fn before(place: u64, entries: u64, length: u64) -> Self {
+        Self {
             entries,
             start: place.saturating_sub(length),
             length,
-        };
-        let locator = at.checked_sub(20).map(|from| &tail[from..at]);
-        let locator = locator.filter(|record| record.starts_with(LARGE_LOCATOR));
-        let (0xffff, Some(locator)) = (entries, locator) else {
-            return Ok(small);
-        };
-        let place = number(locator, 8, 8);
-        let large = bytes_at(archive, place, 56)?;
-        if !large.starts_with(LARGE_END) || large.len() < 56 {
-            return Ok(small);
         }
-        let length = number(&large, 40, 8);
-        Ok(Self {
-            entries: number(&large, 32, 8),
-            start: place.saturating_sub(length),
-            length,
-        })
+    }
+
+    fn large(archive: &mut (impl Read + Seek), place: u64) -> io::Result<Option<Self>> {
+        let end = bytes_at(archive, place, 56)?;
+        let whole = end.starts_with(LARGE_END) && end.len() == 56;
+        Ok(whole.then(|| Self::before(place, number(&end, 32, 8), number(&end, 40, 8))))
     }
 
     /// The first name that stands in it a second time.
     pub(super) fn repeated(&self, archive: &mut (impl Read + Seek)) -> io::Result<Option<String>> {
-        let records = bytes_at(archive, self.start, self.length)?;
+        // Its length is a claim. What lies beyond is not worth the memory: the name is only for the message.
+        let records = bytes_at(archive, self.start, self.length.min(LONGEST))?;
         let (mut rest, mut names) = (&records[..], BTreeSet::new());
         while rest.starts_with(FILE) && rest.len() >= 46 {
             #[allow(clippy::cast_possible_truncation)] // two bytes

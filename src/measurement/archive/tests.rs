@@ -33,6 +33,32 @@ fn announcing(count: u16, large: Option<u64>) -> Bytes {
 }
 
 #[test]
+fn no_end_hides_a_larger_one() {
+    // The small end announces five files and an offset that only the large one can tell.
+    let mut offset = announcing(5, Some(50_000_000)).to_vec();
+    let end = offset.len() - 22;
+    offset[end + 16..end + 20].fill(0xff);
+    // A comment looks like another end, whole or not.
+    let mut comment = announcing(0xffff, Some(50_000_000)).to_vec();
+    comment.extend_from_slice(b"PK\x05\x06");
+    let mut whole = comment.clone();
+    whole.extend_from_slice(&[0; 18]);
+    for bytes in [offset, comment, whole] {
+        let archive = Archive::in_memory(bytes.into(), &Limits::default());
+        assert!(
+            matches!(
+                archive,
+                Err(PackageError::Entries {
+                    count: 50_000_000,
+                    ..
+                })
+            ),
+            "{archive:?}"
+        );
+    }
+}
+
+#[test]
 fn files_are_counted_before_the_directory_is_read() {
     for (count, large, announced) in [
         (30_000, None, 30_000),

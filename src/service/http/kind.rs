@@ -129,7 +129,7 @@ impl Kind {
             ),
             Self::OtherOrigin => (
                 "other-origin",
-                "Pages of this address may not do this",
+                "Pages of another address may not do this",
                 StatusCode::FORBIDDEN,
             ),
             Self::RequestTimeout => (

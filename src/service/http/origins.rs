@@ -2,8 +2,10 @@
 //!
 //! A browser keeps an answer from a page of another origin unless the answer allows it (the Fetch standard's CORS
 //! protocol), but it sends what a form could have sent, an upload as well. Whoever reaches the service may do all that it
-//! does, so nothing is made, changed or deleted for pages that the operator did not name: browsers say of every request
-//! whose page sent it (`Sec-Fetch-Site`). Programs say nothing of the kind and are not asked.
+//! does, so nothing is uploaded, changed or deleted for pages that the operator did not name. Browsers say whose page
+//! sent a request: by `Sec-Fetch-Site` where they trust the address (https, and this machine), by `Origin` otherwise,
+//! which is then held against `Host`. Programs say neither and are not asked. A page that comes to be served under the
+//! service's own name (DNS rebinding) is one of its own.
 
 use std::str::FromStr;
 
@@ -46,10 +48,16 @@ impl FromStr for Origin {
         let written = scheme
             .zip(uri.authority())
             .map(|(scheme, authority)| format!("{scheme}://{authority}"));
-        // Browsers write neither a path nor a user, and hosts in small letters: an origin of another form meets none.
+        // Browsers write neither a path, nor a user, nor the scheme's own port, and hosts in small letters: an origin of
+        // another form meets none.
+        let own_port = match scheme {
+            Some("https") => ":443",
+            _ => ":80",
+        };
         let as_browsers_do = written.as_deref() == Some(text)
-            && !text.contains('@')
-            && !text.contains(|c: char| c.is_ascii_uppercase());
+            && !text.ends_with(own_port)
+            && !text.ends_with(':')
+            && !text.contains(|c: char| c.is_ascii_uppercase() || "@*".contains(c));
         if !as_browsers_do {
             return Err(wrong());
         }
@@ -67,9 +75,11 @@ pub fn is_told(name: &HeaderName) -> bool {
 /// Refuses what a browser sends for a page of another address, unless that may.
 pub async fn held_to_pages(State(app): State<App>, request: Request, next: Next) -> Response {
     let headers = request.headers();
-    let elsewhere = headers
-        .get("sec-fetch-site")
-        .is_some_and(|site| site == "cross-site" || site == "same-site");
+    let elsewhere = match (headers.get("sec-fetch-site"), headers.get(header::ORIGIN)) {
+        (Some(site), _) => site == "cross-site" || site == "same-site",
+        (None, Some(origin)) => !is_of_host(origin, headers.get(header::HOST)),
+        (None, None) => false,
+    };
     if !elsewhere || request.method().is_safe() {
         return next.run(request).await;
     }
@@ -93,6 +103,14 @@ pub async fn held_to_pages(State(app): State<App>, request: Request, next: Next)
     Problem::new(Kind::OtherOrigin, detail)
         .accepting(accepted)
         .into_response()
+}
+
+/// Whether a page of this origin came from the host that the request names.
+fn is_of_host(origin: &HeaderValue, host: Option<&HeaderValue>) -> bool {
+    let text = |value: &HeaderValue| value.to_str().ok().map(str::to_ascii_lowercase);
+    let authority = |origin: &str| origin.split_once("://").map(|(_, rest)| rest.to_owned());
+    let origin = text(origin).as_deref().and_then(authority);
+    origin.is_some() && origin == host.and_then(text)
 }
 
 fn names(origins: &[Origin], origin: &HeaderValue) -> bool {
@@ -161,7 +179,10 @@ mod tests {
             "https://me@cars.example",
             "file:///home",
             "null",
-            "https://*.example\n",
+            "https://*.example",
+            "https://cars.example:443",
+            "http://cars.example:80",
+            "https://cars.example:",
             "ftp://cars.example",
         ] {
             let told = wrong.parse::<Origin>().expect_err(wrong);

@@ -5,7 +5,6 @@
 //! the job or ends the service, whose next start begins the job again.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tokio::sync::SemaphorePermit;
@@ -47,13 +46,6 @@ impl IngestRequest {
     }
 }
 
-/// Pauses between tries while the store fails; the last one again and again.
-const PAUSES: [Duration; 3] = [
-    Duration::from_millis(500),
-    Duration::from_secs(5),
-    Duration::from_mins(1),
-];
-
 /// The job: fits an upload and keeps the paint.
 pub async fn ingest(
     app: &App,
@@ -61,12 +53,17 @@ pub async fn ingest(
     lane: SemaphorePermit<'_>,
 ) -> Result<Ended, Problem> {
     let id = &under_way.job().subject;
-    if app.catalogue.paint(id).await?.is_some() {
-        return Ok(Ok(()));
-    }
     let IngestRequest { upload, order } = under_way.request()?;
     let upload = upload.hash()?;
-    let local = app.blobs.local(upload).await?;
+    let Ok(there) = under_way.insist(app, || app.catalogue.paint(id)).await? else {
+        return Ok(Err(CalledOff));
+    };
+    if there.is_some() {
+        return Ok(Ok(()));
+    }
+    let Ok(local) = under_way.insist(app, || app.blobs.local(upload)).await? else {
+        return Ok(Err(CalledOff));
+    };
     let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
     let works = Arc::clone(&app.works);
     let fitted = under_way.compute(app, "fitting", move |progress| {
@@ -86,23 +83,13 @@ pub async fn ingest(
         app.metrics.paints_fitted.increment(1);
     }
     let written = app.written_out(file).await?;
-    // Others go on while this waits for room on the disk.
-    drop(lane);
-    let mut pauses = PAUSES.into_iter();
-    loop {
-        under_way.stage("storing");
-        let Err(error) = app.keep_paint(id, &written, Some(upload)).await else {
-            return Ok(Ok(()));
-        };
-        tracing::warn!(%error, job = under_way.job().id, "a paint could not be kept; the job tries again");
-        under_way.stage("waiting to try again: the store takes nothing");
-        let pause = pauses.next().unwrap_or(PAUSES[PAUSES.len() - 1]);
-        tokio::select! {
-            () = tokio::time::sleep(pause) => {}
-            () = under_way.called_off() => return Ok(Err(CalledOff)),
-            () = app.stopped() => return Ok(Err(CalledOff)),
-        }
-    }
+    // Others go on while a few wait for room on the disk.
+    let held = app.jobs.held.try_acquire();
+    let _lane = held.is_err().then_some(lane);
+    under_way.stage("storing");
+    under_way
+        .insist(app, || app.keep_paint(id, &written, Some(upload)))
+        .await
 }
 
 /// Lets go of the upload of a job that came to nothing, unless that was our own fault.

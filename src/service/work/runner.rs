@@ -27,6 +27,9 @@ const MOST_ATTEMPTS: u32 = 10;
 /// How often the end of a job is written before it is left to the next start.
 const MOST_ENDINGS: u32 = 5;
 
+/// Paints that are held in memory until the store takes them, beside those that hold a lane.
+const MOST_HELD: usize = 8;
+
 /// Ended jobs that can still be asked for.
 const JOBS_KEPT: u32 = 10_000;
 
@@ -35,6 +38,8 @@ const JOBS_KEPT: u32 = 10_000;
 pub struct Jobs {
     lanes: Arc<Semaphore>,
     pub(super) bench: Workbench,
+    /// Places of paints that are fitted and wait for the store.
+    pub(super) held: Semaphore,
     under_way: Mutex<HashMap<String, Arc<UnderWay>>>,
     submitting: tokio::sync::Mutex<()>,
     most: usize,
@@ -50,6 +55,7 @@ impl Jobs {
         Self {
             lanes: Arc::new(Semaphore::new(at_a_time)),
             bench: Workbench::new(at_a_time, usize::MAX),
+            held: Semaphore::new(MOST_HELD),
             under_way: Mutex::default(),
             submitting: tokio::sync::Mutex::default(),
             most,
@@ -204,7 +210,14 @@ async fn run_to_end(app: &App, under_way: &Arc<UnderWay>) -> Result<Option<JobDo
     let Some(lane) = lane else {
         return end(app, job, JobState::Cancelled, None).await.map(Some);
     };
-    app.catalogue.begin_job(&job.id).await?;
+    let begun = under_way.insist(app, || app.catalogue.begin_job(&job.id));
+    if begun.await?.is_err() {
+        return if under_way.is_cancelled() {
+            end(app, job, JobState::Cancelled, None).await.map(Some)
+        } else {
+            Ok(None)
+        };
+    }
     under_way
         .told
         .send_modify(|told| told.state = JobState::Running);

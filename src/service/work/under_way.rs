@@ -10,7 +10,12 @@ use super::job_document::JobDocument;
 use super::workbench::{CalledOff, call_off};
 use crate::service::app::App;
 use crate::service::http::Problem;
-use crate::store::JobRecord;
+use crate::store::{JobRecord, StoreError};
+
+/// First pauses between questions to a store that does not answer.
+const PAUSES: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(5)];
+/// The pauses after them.
+const LONGEST_PAUSE: Duration = Duration::from_mins(1);
 
 /// A job that is queued or running in this process.
 #[derive(Debug)]
@@ -80,6 +85,42 @@ impl UnderWay {
             .bench
             .run_or_call_off(move || work(&progress))
             .await
+    }
+
+    /// Asks the store until it answers: a disk that is full may be made room on, a database that is busy comes to rest.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] for a record that does not read back, which no time mends.
+    pub async fn insist<T, F>(
+        &self,
+        app: &App,
+        ask: impl Fn() -> F,
+    ) -> Result<Result<T, CalledOff>, Problem>
+    where
+        F: Future<Output = Result<T, StoreError>>,
+    {
+        let stage = self.told.borrow().stage.clone();
+        let mut pauses = PAUSES.into_iter();
+        loop {
+            match ask().await {
+                Ok(answer) => {
+                    self.stage(&stage);
+                    return Ok(Ok(answer));
+                }
+                Err(error @ StoreError::Corrupt { .. }) => return Err(error.into()),
+                Err(error) => {
+                    tracing::warn!(%error, job = self.job.id, "the store does not answer; the job asks again");
+                }
+            }
+            self.stage("waiting for the store");
+            let pause = pauses.next().unwrap_or(LONGEST_PAUSE);
+            tokio::select! {
+                () = tokio::time::sleep(pause) => {}
+                () = self.called_off() => return Ok(Err(CalledOff)),
+                () = app.stopped() => return Ok(Err(CalledOff)),
+            }
+        }
     }
 
     /// Tells the share done, in steps that are worth a message.
