@@ -166,3 +166,41 @@ async fn a_data_folder_serves_one_process() {
     );
     house.close().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_paint_that_cannot_be_stored_waits_for_the_store() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let (incoming, away) = (data.path().join("incoming"), data.path().join("away"));
+    let answer = house.submit(b"slow six").await;
+    let address = answer.header("location").expect("a job").to_owned();
+    while house.get(&address).await.json()["progress"] == 0.0 {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    // Nothing can be written from now on.
+    std::fs::rename(&incoming, &away).expect("moves");
+    let begun = Instant::now();
+    loop {
+        let job = house.get(&address).await.json();
+        assert_eq!(job["state"], "running", "{job}");
+        if job["stage"] == "waiting for the store" {
+            break;
+        }
+        assert!(begun.elapsed() < Duration::from_mins(1), "{job}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    std::fs::rename(&away, &incoming).expect("moves back");
+    let job = loop {
+        let job = house.get(&address).await.json();
+        if job["state"] != "running" {
+            break job;
+        }
+        assert!(begun.elapsed() < Duration::from_mins(2), "{job}");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    };
+    assert_eq!(job["state"], "done", "{job}");
+    let paint = job["result"].as_str().expect("an address");
+    assert_eq!(house.get(paint).await.status, 200);
+    assert_eq!(house.count("carpaint_paints_fitted_total").await, 1.0);
+    house.close().await;
+}
