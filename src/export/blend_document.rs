@@ -16,9 +16,9 @@ const BLENDING: &str = "Weights w are one number a paint, in the order of `paint
      color_table), one for the flakes' lightness, one for their color; inside or beyond 0 to 1. Linear: X = sum of w X_m for ior and \
      roughness of the coat (an index of 1 is no coat), diffuse, weight and f0 of each lobe, CIELAB of each color table node \
      (then to linear sRGB, then between angles), by lightness for the L of both corners of each box, by color and \
-     times the saturation for a and b of both corners. Geometric: X = product of X_m^(w/sum of w) for the alpha of a lobe, and by \
-     lightness for texel_um, grain_um, lifetime_deg and persistence_deg; equal exponents where |sum of w| < 1e-9. Corners that change places are put in order. Probabilities never \
-     change. Bounds: ior 1 to 4, roughness 0 to 1, diffuse and weights 0 to 1000, alpha 0.0001 to 10, f0 0 to 1, Lab -2000 to 2000 an \
+     times the saturation for a and b of both corners. Geometric: X = product of X_m^(w/S), S the sum of w, for the alpha of a lobe, and by lightness for texel_um, \
+     grain_um, lifetime_deg and persistence_deg; where |S| < 0.1 the exponents of n paints are 1/n + (w - S/n) S/0.01 instead. \
+     Corners that change places are put in order. Probabilities never change. Bounds: ior 1 to 4, roughness 0 to 1, diffuse and weights 0 to 1000, alpha 0.0001 to 10, f0 0 to 1, Lab -2000 to 2000 an \
      axis, texel_um 0.001 to 1e5, grain_um 0.001 to 1e6, degrees 0.01 to 1e4. The mean of a slice depends on the weights: sum of \
      probability times the mean linear sRGB over each box, in 1/sr (over pi), colors uniform in the box; carpaint.js has it in \
      closed form and writes it to the texture slice_means, which is not in this archive. The random tile is that of equal weights \

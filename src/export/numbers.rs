@@ -29,7 +29,7 @@ pub(super) fn documentation(groups: &[&[Number]]) -> Value {
 #[rustfmt::skip]
 pub(super) const PAINT: &[Number] = &[
     ("version", "1", (1.0, ANY), "version of this document's form; later versions may add, never change"),
-    ("coat.ior", "1", (1.0, 4.0), "index of refraction of the clear coat; below 1.0001 it is optically absent"),
+    ("coat.ior", "1", (1.0, 4.0), "index of refraction of the clear coat; 1 is optically no coat"),
     ("coat.roughness", "1", (0.0, 1.0), "Beckmann roughness of the coat's highlight; below 0.001 a mirror"),
     ("coat.thickness_um", "micrometre", (0.0, 1e6), "thickness as the lab stated it; not used"),
     ("diffuse[]", "1", (0.0, 1000.0), "Lambertian albedo of the base before the color table, linear sRGB"),

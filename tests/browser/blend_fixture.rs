@@ -69,6 +69,7 @@ fn duo_weights() -> Vec<RealisationWeights> {
         RealisationWeights::even(vec![1.0, 0.0]),
         RealisationWeights::even(vec![-0.4, 1.4]),
         RealisationWeights::even(vec![1.8, -0.8]),
+        RealisationWeights::even(vec![0.55, -0.5]),
         RealisationWeights {
             base: Some(vec![0.2, 0.8]),
             flake_lightness: Some(vec![0.9, 0.1]),

@@ -107,19 +107,21 @@ vec3 carpaint_bilinear(sampler2D table, CarpaintBracket row, CarpaintBracket col
 
 // ---- coat ----
 
+// Written without differences that cancel near an index of 1, which reflects nothing and bends nothing.
 float carpaint_fresnel(float cosine, float ior) {
-    if (ior < 1.0001) return 0.0;
+    float excess = max((ior - 1.0) * (ior + 1.0), 0.0);
+    if (excess == 0.0) return 0.0;
     float c = clamp(cosine, 0.0, 1.0);
-    float inner = sqrt(max(0.0, 1.0 - (1.0 - c * c) / (ior * ior)));
-    float s = (c - ior * inner) / (c + ior * inner);
-    float p = (ior * c - inner) / (ior * c + inner);
+    float n2 = ior * ior;
+    float q = sqrt(c * c + excess);
+    float s = excess / ((c + q) * (c + q));
+    float p = excess * ((n2 + 1.0) * c * c - 1.0) / ((n2 * c + q) * (n2 * c + q));
     return 0.5 * (s * s + p * p);
 }
 
 vec3 carpaint_refract(vec3 w, float ior) {
-    if (ior < 1.0001) return w;
-    vec2 across = w.xy / ior;
-    return vec3(across, sqrt(max(0.0, 1.0 - dot(across, across))));
+    float excess = max((ior - 1.0) * (ior + 1.0), 0.0);
+    return vec3(w.xy, sqrt(w.z * w.z + excess)) / ior;
 }
 
 // min(1/(i_z o_z), 2 h_z / ((h.o) max(i_z, o_z))): masking over both cosines.
@@ -130,7 +132,7 @@ float carpaint_masking(CarpaintHalf h, float i_z, float o_z) {
 // Highlight of a coat of finite width, directions outside the coat. 0 for a mirror.
 float carpaint_highlight(vec3 wi, vec3 wo) {
     float roughness = carpaint_coat.y;
-    if (roughness < 1e-3 || carpaint_coat.x < 1.0001) return 0.0;
+    if (roughness < 1e-3) return 0.0;
     CarpaintHalf h = carpaint_half(wi, wo);
     float alpha2 = roughness * roughness;
     float log_d = -h.tan2_h / alpha2 - log(CARPAINT_PI * alpha2) - 4.0 * log(h.h_z);

@@ -204,10 +204,12 @@ function blendedCoat(paints, weights) {
   return ior === 1 ? null : { ior, roughness, mirror: roughness < 1e-3 };
 }
 
-// How widths, sizes and lasting angles blend: by their ratios.
+// How widths, sizes and lasting angles blend: by their ratios. Where the weights sum to less than a tenth the shares pass
+// through the even mean, without a pole.
 function geometricMean(values, weights) {
   const all = weights.reduce((a, w) => a + w, 0);
-  const share = weights.map((w) => (Math.abs(all) < 1e-9 ? 1 / values.length : w / all));
+  const even = 1 / values.length;
+  const share = weights.map((w) => (Math.abs(all) < 0.1 ? even + (w - all * even) * all / 0.01 : w / all));
   return Math.exp(sum(values, share, Math.log));
 }
 
