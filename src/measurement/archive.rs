@@ -56,11 +56,18 @@ impl Default for Unpacking {
     }
 }
 
+/// Bytes that an archive's directory and the search for it may take, beside those for each file.
+const DIRECTORY: u64 = 1 << 20;
+/// Bytes of its directory that a file may take: 46, its name and what else is told of it.
+const DIRECTORY_ENTRY: u64 = 512;
+
 /// A reading position of its own in a shared source.
 struct Cursor {
     source: Source,
     position: u64,
     length: u64,
+    /// Bytes that may still be read.
+    left: u64,
 }
 
 impl Cursor {
@@ -73,6 +80,7 @@ impl Cursor {
             source,
             position: 0,
             length,
+            left: u64::MAX,
         })
     }
 }
@@ -85,6 +93,7 @@ impl Source {
             source: self.clone(),
             position: start,
             length: start + count as u64,
+            left: u64::MAX,
         };
         cursor.read_exact(into)
     }
@@ -102,6 +111,12 @@ fn read_at(file: &File, into: &mut [u8], offset: u64) -> io::Result<usize> {
 
 impl Read for Cursor {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        if self.left == 0 {
+            return Err(io::Error::other("its directory is longer than is accepted"));
+        }
+        let most = usize::try_from(self.left).unwrap_or(usize::MAX);
+        let room = into.len().min(most);
+        let into = &mut into[..room];
         let count = match &self.source {
             Source::File(file) => read_at(file, into, self.position)?,
             Source::Memory(bytes) => {
@@ -112,6 +127,7 @@ impl Read for Cursor {
             }
         };
         self.position += count as u64;
+        self.left -= count as u64;
         Ok(count)
     }
 }
@@ -167,7 +183,8 @@ impl Archive {
                 accepted: limits.bytes,
             });
         }
-        // A directory of millions would be held in memory before it could be counted.
+        // A directory of millions would be held in memory before it could be counted. Where it stands is what the archive
+        // says, in more than one place: wherever it is found, no more of it is read than the files that are accepted need.
         let announced = Directory::announced(&mut cursor, length).map_err(|e| headless(&e))?;
         if announced.entries > limits.entries as u64 {
             return Err(PackageError::Entries {
@@ -175,6 +192,7 @@ impl Archive {
                 accepted: limits.entries,
             });
         }
+        cursor.left = DIRECTORY + DIRECTORY_ENTRY * limits.entries as u64;
         let directory = ZipArchive::new(cursor)
             .map_err(|e| headless(&e))?
             .metadata();

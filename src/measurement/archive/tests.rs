@@ -58,6 +58,31 @@ fn no_end_hides_a_larger_one() {
     }
 }
 
+/// A whole archive of this many files without contents.
+fn of_files(count: usize) -> Vec<u8> {
+    let mut zip = zip::ZipWriter::new(io::Cursor::new(Vec::new()));
+    for k in 0..count {
+        let options = zip::write::SimpleFileOptions::default();
+        zip.start_file(format!("{k:0>200}"), options)
+            .expect("begins");
+    }
+    zip.finish().expect("ends").into_inner()
+}
+
+#[test]
+fn no_more_of_a_directory_is_read_than_the_accepted_files_need() {
+    let few = Limits {
+        entries: 10,
+        ..Limits::default()
+    };
+    // 1.2 MB of directory, the end of which lies where only the reader of archives still looks for it.
+    let mut beyond = of_files(5000);
+    beyond.extend([0; 65_540]);
+    let told = Archive::in_memory(beyond.into(), &few).expect_err("too long");
+    assert!(told.to_string().contains("longer than"), "{told}");
+    assert!(Archive::in_memory(of_files(10).into(), &few).is_ok());
+}
+
 #[test]
 fn files_are_counted_before_the_directory_is_read() {
     for (count, large, announced) in [
