@@ -125,7 +125,7 @@ impl MultiAngle {
     ///
     /// [`ReadColorsError`] naming the column and what would be accepted.
     pub fn colors(&self) -> Result<ReadColors, ReadColorsError> {
-        if !self.columns.iter().any(|column| column.starts_with("nm")) {
+        if !self.has_spectra() {
             return self.lab_colors();
         }
         self.spectral_colors().or_else(|why| {
@@ -139,6 +139,15 @@ impl MultiAngle {
                 ..colors
             })
         })
+    }
+
+    fn has_spectra(&self) -> bool {
+        self.columns.iter().any(|column| column.starts_with("nm"))
+    }
+
+    /// Whether [`MultiAngle::colors`] come from spectra, which no illuminant or observer belongs to.
+    pub(super) fn takes_spectra(&self) -> bool {
+        self.has_spectra() && (self.spectral_colors().is_ok() || self.lab_colors().is_err())
     }
 
     /// Place and wavelength of the spectral columns, ascending.

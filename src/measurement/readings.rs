@@ -27,6 +27,8 @@ const NOTE_CHARACTERS: usize = 200;
 pub struct ReadingsFile {
     /// Name of the paint, where the file says it.
     pub name: Option<String>,
+    /// Whether the paint was asked for by what tells it from others of its name, which is no name to call it by.
+    pub asked_by_id: bool,
     /// What else the file says about itself: instrument, date, who made it.
     pub notes: BTreeMap<String, String>,
     /// The readings.

@@ -56,7 +56,7 @@ pub(super) fn doubts(colors: &ReadColors, reads: &[Read]) -> Vec<String> {
         let light = of_angle.iter().map(|read| read.whole);
         let most = light.clone().fold(f64::NEG_INFINITY, f64::max);
         let least = light.fold(f64::INFINITY, f64::min);
-        if most > ONE_ANGLE * least {
+        if of_angle.len() > 1 && most > ONE_ANGLE * least.max(0.0) {
             doubts.push(format!(
                 "the {} readings at {}° contradict each other: the brightest has {:.1} times the light of the darkest",
                 of_angle.len(),

@@ -60,7 +60,14 @@ pub(super) fn read_csv(text: &str, limits: &Limits) -> Result<ReadingsFile, CsvE
         ("illuminant", "D65", remarks.illuminant.is_none(), false),
         ("observer", "2", remarks.observer.is_none(), false),
     ];
-    let of_spectra = columns.iter().any(|name| name.starts_with("nm"));
+    let readings = MultiAngle {
+        illumination_deg: remarks.illumination_deg.unwrap_or(45.0),
+        illuminant: remarks.illuminant.unwrap_or(Illuminant::D65),
+        observer: remarks.observer.unwrap_or(Observer::Two),
+        columns,
+        rows,
+    };
+    let of_spectra = readings.takes_spectra();
     let unsaid: Vec<_> = unsaid
         .iter()
         .filter(|said| said.2 && (said.3 || !of_spectra))
@@ -80,16 +87,19 @@ pub(super) fn read_csv(text: &str, limits: &Limits) -> Result<ReadingsFile, CsvE
             lines.join(", ")
         ));
     }
+    if remarks.untold > 0 {
+        remarks.warnings.push(format!(
+            "{} more {} nothing that a table of readings says, and {} not read",
+            remarks.untold,
+            counted(remarks.untold, "remark is", "remarks are"),
+            counted(remarks.untold, "was", "were"),
+        ));
+    }
     Ok(ReadingsFile {
         name: remarks.name,
+        asked_by_id: false,
         notes: remarks.notes,
-        readings: MultiAngle {
-            illumination_deg: remarks.illumination_deg.unwrap_or(45.0),
-            illuminant: remarks.illuminant.unwrap_or(Illuminant::D65),
-            observer: remarks.observer.unwrap_or(Observer::Two),
-            columns,
-            rows,
-        },
+        readings,
         warnings: remarks.warnings,
     })
 }

@@ -2,7 +2,7 @@
 //!
 //! A reading is a `ColorCIELab`, `ColorCIELCh`, `ColorCIEXYZ`, `ReflectanceSpectrum` or `CustomSpectrum` whose
 //! `ColorSpecification` has the geometry `MultiAngle`: one `BRDFAngle` for each specification, or several of which the
-//! value names one, its `Name` being their `Notation`. A `SingleAngle` of 45° and 0° is a reading at 45°. Angles out of
+//! value names one, its `Name` being their `Notation`. A `SingleAngle` with light or viewer at 0°, such as 45/0, is a reading at the other angle. Angles out of
 //! the plane of incidence, spheres and transmission are none, and are told.
 //!
 //! A paint is an object with a value for each angle, or objects of one type and name whose angles are not each other's;
@@ -80,6 +80,7 @@ pub(super) fn read_cxf(
             .collect();
     }
     Ok(ReadingsFile {
+        asked_by_id: wanted.is_some_and(|wanted| paint.has_id(wanted.trim())),
         name: as_name(paint.name)
             .or_else(|| as_name(root.at(&["FileInformation"])?.said("Description")?)),
         notes,
@@ -122,13 +123,18 @@ fn readings_of(
     };
     check(paint.values().count(), KINDS * most)?;
     let mut choices: Vec<(&Kind, f64, Vec<f64>)> = Vec::new();
+    // Thousands of them with as many wavelengths each would be compared for a long time.
+    let mut places: BTreeMap<(u64, Vec<u64>), usize> = BTreeMap::new();
     for value in paint.values() {
         let (kind, light) = (&value.kind, value.angles.illumination_deg);
         let angle = value.angles.aspecular_deg;
-        match choices.iter_mut().find(|of| of.0 == kind && of.1 == light) {
-            Some(choice) => choice.2.push(angle),
-            None => choices.push((kind, light, vec![angle])),
+        let place = *places
+            .entry((light.to_bits(), kind.bits()))
+            .or_insert(choices.len());
+        if place == choices.len() {
+            choices.push((kind, light, Vec::new()));
         }
+        choices[place].2.push(angle);
     }
     for (_, _, angles) in &mut choices {
         angles.sort_by(f64::total_cmp);
@@ -146,7 +152,7 @@ fn readings_of(
         return Err(CxfError::NoObject);
     };
     let chosen =
-        |value: &&Value| value.kind == *kind && value.angles.illumination_deg == illumination_deg;
+        |value: &&Value| value.angles.illumination_deg == illumination_deg && value.kind == *kind;
     let rows: Vec<Vec<f64>> = paint
         .values()
         .filter(chosen)

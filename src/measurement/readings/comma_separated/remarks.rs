@@ -26,6 +26,8 @@ pub(super) struct Remarks {
     pub illuminant: Option<Illuminant>,
     pub observer: Option<Observer>,
     pub warnings: Vec<String>,
+    /// Remarks that were not read and are not among the warnings.
+    pub untold: usize,
     /// Line and value of what was said, by what it is about.
     said: BTreeMap<String, (u64, String)>,
 }
@@ -40,7 +42,8 @@ impl Remarks {
         let Some((key, value)) = text.trim_start_matches(['#', ' ']).split_once(':') else {
             return Ok(());
         };
-        let (key, value) = (key.trim(), value.trim());
+        let (said_key, value) = (key.trim(), value.trim());
+        let key = &*said_key.to_ascii_lowercase();
         let refuse = |accepted: &'static str| CsvError::Remark {
             line,
             key: told(key),
@@ -96,9 +99,9 @@ impl Remarks {
             }
             _ if self.warnings.len() < UNKNOWN_TOLD => self.warnings.push(format!(
                 "line {line}: {:?} is nothing that a table of readings says, and was not read",
-                told(key)
+                told(said_key)
             )),
-            _ => {}
+            _ => self.untold += 1,
         }
         Ok(())
     }

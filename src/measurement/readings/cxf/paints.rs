@@ -59,6 +59,11 @@ impl<'a> Paint<'a> {
         self.parts.iter().flat_map(|part| &part.values)
     }
 
+    /// Whether one of its objects has this Id, which is not empty.
+    pub fn has_id(&self, id: &str) -> bool {
+        !id.is_empty() && self.parts.iter().any(|part| part.attribute("Id") == id)
+    }
+
     /// How it is called in a message.
     pub fn called(&self) -> String {
         match &self.parts[..] {
@@ -184,12 +189,7 @@ fn chosen<'a>(
     }
     let mut paints: Vec<Paint> = read.into_iter().map(Paint::of).collect();
     if let Some(wanted) = wanted {
-        let has_id = |paint: &Paint| {
-            paint
-                .parts
-                .iter()
-                .any(|part| part.attribute("Id") == wanted)
-        };
+        let has_id = |paint: &Paint| paint.has_id(wanted);
         if paints.iter().any(has_id) {
             return the_only(paints, has_id, wanted);
         }

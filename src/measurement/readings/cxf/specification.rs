@@ -140,14 +140,15 @@ fn geometry(measured: Option<&Element>) -> Result<Geometry, String> {
         .and_then(|geometry| geometry.children.first());
     let Some(choice) = choice else {
         return Err(
-            "it says no geometry, accepted are MultiAngle, and SingleAngle of 45 and 0".to_owned(),
+            "it says no geometry, accepted are MultiAngle, and SingleAngle of which one angle is 0"
+                .to_owned(),
         );
     };
     match choice.name.as_str() {
         "MultiAngle" => multi_angle(choice),
         "SingleAngle" => single_angle(choice).map(Geometry::One),
         other => Err(format!(
-            "its geometry is {}, accepted are MultiAngle, and SingleAngle of 45 and 0",
+            "its geometry is {}, accepted are MultiAngle, and SingleAngle of which one angle is 0",
             told(other)
         )),
     }

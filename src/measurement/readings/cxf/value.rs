@@ -29,6 +29,14 @@ pub(super) enum Kind {
 }
 
 impl Kind {
+    /// What tells it from other kinds.
+    pub fn bits(&self) -> Vec<u64> {
+        match self {
+            Self::Spectrum(nm) => nm.iter().map(|nm| nm.to_bits()).collect(),
+            Self::Lab(..) => vec![self.rank().into()],
+        }
+    }
+
     /// Which kind is preferred where several tell as many angles: what needs the fewest assumptions, first.
     pub fn rank(&self) -> u8 {
         match self {

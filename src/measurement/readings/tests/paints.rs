@@ -53,6 +53,7 @@ fn of_several_paints_one_must_be_asked_for() {
             (file.readings.rows[0][1], file.name.as_deref()),
             (20.0, Some("blue"))
         );
+        assert_eq!(file.asked_by_id, wanted == "o2");
     }
     let said = refused_of(&text, Some("red"));
     assert!(
