@@ -56,6 +56,7 @@ pub struct Shared {
     pub uploading: Uploading,
     ready: AtomicBool,
     stopping: watch::Sender<bool>,
+    given_up: AtomicBool,
     /// Held open: the lock on the data folder.
     _lock: File,
 }
@@ -126,6 +127,7 @@ impl App {
             uploading: Uploading::default(),
             ready: AtomicBool::new(false),
             stopping: watch::Sender::new(false),
+            given_up: AtomicBool::new(false),
             _lock: lock,
             config,
         })))
@@ -151,6 +153,17 @@ impl App {
     #[must_use]
     pub fn is_stopping(&self) -> bool {
         *self.stopping.borrow()
+    }
+
+    /// Calls off what is still computed for callers: their time to wait is over.
+    pub fn give_up(&self) {
+        self.given_up.store(true, Ordering::SeqCst);
+    }
+
+    /// Whether nobody is waited for any more.
+    #[must_use]
+    pub fn has_given_up(&self) -> bool {
+        self.given_up.load(Ordering::SeqCst)
     }
 
     /// Returns once the service goes down.

@@ -10,7 +10,9 @@ use super::http::Problem;
 use super::shelf::{unknown_blend, unknown_paint};
 use super::work::{Thing, colors};
 use crate::paint::{NotFinite, PaintFile};
-use crate::store::{BlobBytes, EnvironmentRecord, Hash, PaintRecord, StoreError, Visibility};
+use crate::store::{
+    BlendRecord, BlobBytes, EnvironmentRecord, Hash, PaintRecord, StoreError, Visibility,
+};
 
 /// What is kept of a paint, worked out.
 #[derive(Debug)]
@@ -103,6 +105,29 @@ impl App {
         Ok(())
     }
 
+    /// Keeps a blend of these paints under an id. Nothing happens where the id is taken.
+    ///
+    /// # Errors
+    ///
+    /// [`StoreError`] when the store fails; it may go well later.
+    pub async fn keep_blend(
+        &self,
+        id: &str,
+        paints: &[String],
+        options: &str,
+        file: Bytes,
+    ) -> Result<(), StoreError> {
+        let _writing = self.removal.read().await;
+        let record = BlendRecord {
+            id: id.to_owned(),
+            paints: paints.to_vec(),
+            options: options.to_owned(),
+            blend: self.blobs.put(file).await?.hash,
+        };
+        self.catalogue.add_blend(&record).await?;
+        Ok(())
+    }
+
     /// A blob that the record of a paint names, to be streamed.
     ///
     /// # Errors
@@ -130,7 +155,8 @@ impl App {
             .remove_paint(id)
             .await?
             .ok_or_else(|| unknown_paint(id))?;
-        self.shelf.invalidate(id).await;
+        // Its blends are private from now on.
+        self.shelf.invalidate_all();
         for blob in gone.measurement.into_iter().chain([gone.paint]) {
             self.forget_unnamed(blob).await?;
         }

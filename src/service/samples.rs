@@ -120,6 +120,16 @@ mod tests {
         let seen = [
             format!("model {}", ids::MODEL),
             format!("{} slices", flakes.slices()),
+            format!(
+                "{} clusters, {:.1} Lab",
+                flakes.clusters(),
+                flakes
+                    .lower
+                    .iter()
+                    .map(|corner| f64::from(corner[0]))
+                    .sum::<f64>()
+                    / flakes.clusters() as f64
+            ),
             format!("grain {:.1}", flakes.texture.grain_um),
             format!("instrument {}", read.join(" ")),
             format!("pictures {}", light.join(" ")),
@@ -129,6 +139,11 @@ mod tests {
                     .as_f64()
                     .expect("a number")
             ),
+            format!(
+                "ball {:.4} m",
+                document["accessors"][0]["max"][0].as_f64().expect("m")
+            ),
+            format!("albedo {:.3}", paint.energy.albedo[0]),
         ];
         assert_eq!(
             seen, GOLDEN,
@@ -136,13 +151,16 @@ mod tests {
         );
     }
 
-    const GOLDEN: [&str; 6] = [
-        "model 7",
+    const GOLDEN: [&str; 9] = [
+        "model 8",
         "169 slices",
+        "2002 clusters, 91.7 Lab",
         "grain 15.9",
         "instrument 2.5016 1.4479 0.5679 0.1028 0.0167 0.0046",
         "pictures 0.297 0.493",
         "glTF 0.41",
+        "ball 0.0098 m",
+        "albedo 0.852",
     ];
 
     #[tokio::test]

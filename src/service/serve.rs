@@ -193,6 +193,7 @@ pub async fn serve(app: App, listener: TcpListener, stop: impl Future<Output = (
         }
     })
     .await;
+    app.give_up();
 }
 
 async fn tidy_now_and_then(app: App) {

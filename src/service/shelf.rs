@@ -195,18 +195,22 @@ impl App {
     }
 
     async fn read_blend(&self, id: &str) -> Result<Option<Shelved>, Problem> {
-        let Some(BlendRecord {
+        let (record, visibility, bytes) = {
+            let _reading = self.removal.read().await;
+            let Some(record) = self.catalogue.blend(id).await? else {
+                return Ok(None);
+            };
+            let visibility = self.visibility_of_blend(&record.paints).await?;
+            let bytes = self.stored(record.blend).await?;
+            (record, visibility, bytes)
+        };
+        let BlendRecord {
             id,
             paints,
             options,
             blend: file,
-        }) = self.catalogue.blend(id).await?
-        else {
-            return Ok(None);
-        };
+        } = record;
         let options: BlendOptions = serde_json::from_str(&options).map_err(Problem::internal)?;
-        let visibility = self.visibility_of_blend(&paints).await?;
-        let bytes = self.stored(file).await?;
         let (limits, works) = (self.config.limits, Arc::clone(&self.works));
         let shelve = move || -> Result<Shelved, Problem> {
             let blend = Blend::from_bytes(&bytes, &limits)
@@ -233,11 +237,12 @@ impl App {
         self.bench.run(shelve).await?.map(Some)
     }
 
-    /// A blend is as private as the most private of its paints. One that is gone says no more who may see it.
+    /// A blend is as private as the most private of its paints, and private where one is gone: nobody says any more that it
+    /// was not.
     async fn visibility_of_blend(&self, paints: &[String]) -> Result<Visibility, Problem> {
         for paint in paints {
             let record = self.catalogue.paint(paint).await?;
-            if record.is_some_and(|paint| paint.visibility == Visibility::Private) {
+            if record.is_none_or(|paint| paint.visibility == Visibility::Private) {
                 return Ok(Visibility::Private);
             }
         }

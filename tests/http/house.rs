@@ -311,6 +311,19 @@ impl House {
         self.ask("POST", "/v1/paints", &headers, words).await
     }
 
+    /// Asks for a job until it is as wanted, and gives it; panics with its last state after a minute.
+    pub async fn until(&self, job: &str, wanted: impl Fn(&Value) -> bool) -> Value {
+        let begun = Instant::now();
+        loop {
+            let state = self.get(job).await.json();
+            if wanted(&state) {
+                return state;
+            }
+            assert!(begun.elapsed() < Duration::from_mins(1), "{state}");
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    }
+
     /// Blends paints and gives the blend's id.
     pub async fn blend(&self, paints: &[&str]) -> String {
         let body = json!({ "paints": paints }).to_string();

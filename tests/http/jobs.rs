@@ -1,7 +1,5 @@
 //! Longer work, and what becomes of it over a restart.
 
-use std::time::{Duration, Instant};
-
 use carpaint::service::ServiceConfig;
 use futures::future::join_all;
 use serde_json::json;
@@ -77,14 +75,8 @@ async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
 
     let failed = house.submit(b"not one").await;
     let address = failed.header("location").expect("a job").to_owned();
-    while !["failed"].contains(
-        &house.get(&address).await.json()["state"]
-            .as_str()
-            .expect("a state"),
-    ) {
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
-    let problem = house.get(&address).await.json()["problem"].clone();
+    let failed = house.until(&address, |job| job["state"] == "failed").await;
+    let problem = &failed["problem"];
     assert_eq!(problem["type"], "/problems/unusable-measurement");
     assert_eq!(problem["detail"], "the upload: this is no measurement");
     let blobs = walk(&data.path().join("blobs"));
@@ -110,10 +102,8 @@ async fn a_restart_changes_nothing_and_goes_on_with_what_was_under_way() {
     let before = join_all(addresses.iter().map(|path| house.get(path))).await;
     let answer = house.submit(b"slow three").await;
     let job = answer.header("location").expect("a job").to_owned();
-    while house.get(&job).await.json()["state"] == "queued" {
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
-    assert_eq!(house.get(&job).await.json()["state"], "running");
+    let begun = house.until(&job, |job| job["state"] != "queued").await;
+    assert_eq!(begun["state"], "running");
     house.close().await;
 
     let house = House::open(data.path()).await;
@@ -137,15 +127,7 @@ async fn a_restart_changes_nothing_and_goes_on_with_what_was_under_way() {
         0.0,
         "the other order shares the kept correspondence"
     );
-    let begun = Instant::now();
-    while house.get(&job).await.json()["state"] != "done" {
-        assert!(
-            begun.elapsed() < Duration::from_secs(30),
-            "{:?}",
-            house.get(&job).await
-        );
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    }
+    house.until(&job, |job| job["state"] == "done").await;
     house.close().await;
 }
 
@@ -174,30 +156,14 @@ async fn a_paint_that_cannot_be_stored_waits_for_the_store() {
     let (incoming, away) = (data.path().join("incoming"), data.path().join("away"));
     let answer = house.submit(b"slow six").await;
     let address = answer.header("location").expect("a job").to_owned();
-    while house.get(&address).await.json()["progress"] == 0.0 {
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
+    house.until(&address, |job| job["progress"] != 0.0).await;
     // Nothing can be written from now on.
     std::fs::rename(&incoming, &away).expect("moves");
-    let begun = Instant::now();
-    loop {
-        let job = house.get(&address).await.json();
-        assert_eq!(job["state"], "running", "{job}");
-        if job["stage"] == "waiting for the store" {
-            break;
-        }
-        assert!(begun.elapsed() < Duration::from_mins(1), "{job}");
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
+    let stage = |job: &serde_json::Value| job["stage"] == "waiting for the store";
+    let waiting = house.until(&address, stage).await;
+    assert_eq!(waiting["state"], "running", "{waiting}");
     std::fs::rename(&away, &incoming).expect("moves back");
-    let job = loop {
-        let job = house.get(&address).await.json();
-        if job["state"] != "running" {
-            break job;
-        }
-        assert!(begun.elapsed() < Duration::from_mins(2), "{job}");
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    };
+    let job = house.until(&address, |job| job["state"] != "running").await;
     assert_eq!(job["state"], "done", "{job}");
     let paint = job["result"].as_str().expect("an address");
     assert_eq!(house.get(paint).await.status, 200);

@@ -55,7 +55,11 @@ pub async fn envelope(State(app): State<App>, request: Request, next: Next) -> R
     app.metrics.request(&method, route, response.status(), time);
     if response.status().is_server_error() {
         let (status, id) = (response.status().as_u16(), id.to_str().unwrap_or("-"));
-        tracing::warn!(%method, route, status, request_id = id, "a request failed");
+        if route == "/readyz" {
+            tracing::debug!(status, "not ready");
+        } else {
+            tracing::warn!(%method, route, status, request_id = id, "a request failed");
+        }
     }
     let headers = response.headers_mut();
     headers.insert(REQUEST_ID, id);

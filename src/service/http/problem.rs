@@ -251,10 +251,7 @@ impl WorkError {
     pub fn of_query(self) -> Problem {
         match (self.fault, &self.field) {
             (Fault::Internal, _) => Problem::internal(self.message),
-            (_, Some(field)) => self.accepting(Problem::parameter(
-                field.trim_start_matches('-'),
-                &*self.message,
-            )),
+            (_, Some(field)) => self.accepting(Problem::parameter(field, &*self.message)),
             (_, None) => self.accepting(Problem::new(Kind::InvalidParameter, &*self.message)),
         }
     }
@@ -264,10 +261,7 @@ impl WorkError {
     pub fn of_body(self) -> Problem {
         match (self.fault, &self.field) {
             (Fault::Internal, _) => Problem::internal(self.message),
-            (_, Some(field)) => self.accepting(Problem::value(
-                format!("/{}", field.trim_start_matches('-')),
-                &*self.message,
-            )),
+            (_, Some(field)) => self.accepting(Problem::value(format!("/{field}"), &*self.message)),
             (_, None) => self.accepting(Problem::new(Kind::InvalidValue, &*self.message)),
         }
     }

@@ -1,6 +1,7 @@
 //! Pages of lists: how long they are, and where they begin.
 
 use crate::service::http::Problem;
+use crate::store::Hash;
 
 /// Longest page of a list.
 const LONGEST_PAGE: u32 = 200;
@@ -25,20 +26,22 @@ pub fn limit(asked: Option<u32>) -> Result<u32, Problem> {
 ///
 /// [`Problem`] for a cursor that was not made here.
 pub fn begin(cursor: Option<&str>) -> Result<Option<i64>, Problem> {
-    let begin = cursor.map(|cursor| i64::from_str_radix(cursor, 36));
-    begin.transpose().map_err(|_| {
+    let Some(text) = cursor else {
+        return Ok(None);
+    };
+    // One that was made here reads the same when it is made again.
+    let begin = (text.get(..16))
+        .and_then(|digits| i64::from_str_radix(digits, 16).ok())
+        .filter(|&begin| self::cursor(begin) == text);
+    begin.map(Some).ok_or_else(|| {
         Problem::parameter("cursor", "The cursor was not made here.")
             .accepting("`next` of the page before")
     })
 }
 
-/// The cursor of a page: it says nothing to who holds it.
+/// The cursor of a page: its beginning and a check, which say nothing to those who hold it.
 #[must_use]
-pub fn cursor(mut begin: i64) -> String {
-    let mut digits = Vec::new();
-    while begin > 0 {
-        digits.push(char::from_digit(u32::try_from(begin % 36).unwrap_or(0), 36).unwrap_or('0'));
-        begin /= 36;
-    }
-    digits.iter().rev().collect()
+pub fn cursor(begin: i64) -> String {
+    let check = Hash::of(format!("cursor {begin}").as_bytes()).to_string();
+    format!("{begin:016x}{}", &check[..8])
 }

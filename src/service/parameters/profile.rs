@@ -48,7 +48,7 @@ pub struct KnobsDocument {
     clusters: Option<u32>,
     /// Box of a cluster: `moments` or `tight`.
     box_rule: Option<String>,
-    /// Every so many-th measured angle is used.
+    /// Every n-th measured angle is used.
     #[schema(minimum = 1, maximum = 16)]
     angle_step: Option<u32>,
     /// Solver of each slice: `exact`, `sinkhorn` or `greedy`.

@@ -14,7 +14,7 @@ use crate::service::app::App;
 use crate::service::environments::Unread;
 use crate::service::http::{Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument, Problems};
 use crate::service::parameters::view::{self, Names, Side};
-use crate::service::parameters::{ProfileDocument, ProfileText, targets};
+use crate::service::parameters::{ProfileDocument, ProfileText, WeightQuery, targets};
 use crate::service::shelf::Shelved;
 use crate::service::work::{
     Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, Shape, Show, View, WorkError,
@@ -36,6 +36,14 @@ pub struct EstimateOrder {
     paints: Option<Vec<String>>,
     /// Weights of a blend, in the order of its paints; even unless given.
     weights: Option<Vec<f64>>,
+    /// Weights of coat, diffuse, lobes and color table alone.
+    base: Option<Vec<f64>>,
+    /// Weights of the flakes' lightness, grain and lifetime alone.
+    flake_lightness: Option<Vec<f64>>,
+    /// Weights of the flakes' color alone.
+    flake_color: Option<Vec<f64>>,
+    /// Factor on the flakes' color.
+    flake_saturation: Option<f64>,
     /// File to write, `zip` unless given.
     format: Option<Format>,
     /// What the paint is on, `sphere` unless given.
@@ -213,6 +221,10 @@ impl EstimateOrder {
             ("blend", self.blend.is_some()),
             ("paints", self.paints.is_some()),
             ("weights", self.weights.is_some()),
+            ("base", self.base.is_some()),
+            ("flake_lightness", self.flake_lightness.is_some()),
+            ("flake_color", self.flake_color.is_some()),
+            ("flake_saturation", self.flake_saturation.is_some()),
             ("format", self.format.is_some()),
             ("scene", self.scene.is_some()),
             ("size", self.size.is_some()),
@@ -223,7 +235,19 @@ impl EstimateOrder {
             (WorkName::Ingest, _) => ("ingest", &["paint"]),
             (WorkName::Blend, _) => ("blend", &["paints"]),
             (WorkName::Realise, None) => ("realise, of a paint,", &["paint", "format"]),
-            (WorkName::Realise, Some(_)) => ("realise", &["paint", "blend", "weights", "format"]),
+            (WorkName::Realise, Some(_)) => (
+                "realise",
+                &[
+                    "paint",
+                    "blend",
+                    "weights",
+                    "base",
+                    "flake_lightness",
+                    "flake_color",
+                    "flake_saturation",
+                    "format",
+                ],
+            ),
             (WorkName::Preview, None) => (
                 "preview, of a paint,",
                 &["paint", "scene", "size", "show", "environment"],
@@ -234,6 +258,10 @@ impl EstimateOrder {
                     "paint",
                     "blend",
                     "weights",
+                    "base",
+                    "flake_lightness",
+                    "flake_color",
+                    "flake_saturation",
                     "scene",
                     "size",
                     "show",
@@ -348,21 +376,23 @@ impl EstimateOrder {
             }
             (None, Some(id)) => {
                 let blend = of_field(app.blend(id).await, "/blend")?;
-                let weights = self.weights_for(blend.names.len())?;
+                let weights = self.weights_for(&blend.names)?;
                 Ok((blend, Some(weights)))
             }
             _ => Err(missing("paint").accepting("either paint or blend")),
         }
     }
 
-    fn weights_for(&self, paints: usize) -> Result<RealisationWeights, Problem> {
-        let even = || vec![1.0 / paints as f64; paints];
-        let weights = self.weights.clone().unwrap_or_else(even);
-        if weights.len() != paints {
-            let detail = format!("{} weights for {paints} paints.", weights.len());
-            return Err(Problem::value("/weights", detail).accepting(format!("{paints} numbers")));
-        }
-        Ok(RealisationWeights::even(weights))
+    fn weights_for(&self, names: &[String]) -> Result<RealisationWeights, Problem> {
+        let even = || vec![1.0 / names.len() as f64; names.len()];
+        let asked = WeightQuery::of_lists(
+            Some(self.weights.clone().unwrap_or_else(even)),
+            self.base.clone(),
+            self.flake_lightness.clone(),
+            self.flake_color.clone(),
+            self.flake_saturation,
+        );
+        asked.for_blend(names).map_err(Problem::in_body)
     }
 
     fn with_asked<T>(

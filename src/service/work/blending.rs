@@ -15,7 +15,6 @@ use crate::service::app::App;
 use crate::service::http::{Kind, Problem};
 use crate::service::ids;
 use crate::service::shelf::Shelved;
-use crate::store::BlendRecord;
 
 /// What a job needs to make a blend.
 #[derive(Debug, Serialize, Deserialize)]
@@ -38,7 +37,10 @@ pub struct BlendOptions {
 /// The job: finds the correspondence and keeps the blend.
 pub async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Problem> {
     let id = &under_way.job().subject;
-    if app.catalogue.blend(id).await?.is_some() {
+    let Ok(there) = under_way.insist(app, || app.catalogue.blend(id)).await? else {
+        return Ok(Err(CalledOff));
+    };
+    if there.is_some() {
         return Ok(Ok(()));
     }
     let BlendRequest { paints, profile } = under_way.request()?;
@@ -69,19 +71,10 @@ pub async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Proble
         }
     };
     under_way.stage("storing");
-    let _writing = app.removal.read().await;
-    let blend = app.blobs.put(file).await?.hash;
     let options =
         serde_json::to_string(&BlendOptions { profile, places }).map_err(Problem::internal)?;
-    app.catalogue
-        .add_blend(&BlendRecord {
-            id: id.clone(),
-            paints,
-            options,
-            blend,
-        })
-        .await?;
-    Ok(Ok(()))
+    let keep = || app.keep_blend(id, &paints, &options, file.clone());
+    under_way.insist(app, keep).await
 }
 
 async fn correspond(

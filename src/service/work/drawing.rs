@@ -70,7 +70,7 @@ pub async fn draw(
             let bench = on.bench.clone();
             let app = on.clone();
             let progress = move |_: f32| {
-                if app.is_stopping() || !app.watchers.any(key) {
+                if app.has_given_up() || !app.watchers.any(key) {
                     call_off();
                 }
             };
@@ -96,7 +96,7 @@ pub async fn draw(
         };
         match app.results.get_or_compute(key, compute).await {
             // Whoever was before us gave up a moment ago.
-            Err(problem) if problem.kind() == Kind::JobCancelled && !app.is_stopping() => {}
+            Err(problem) if problem.kind() == Kind::JobCancelled && !app.has_given_up() => {}
             Err(problem) if problem.kind() == Kind::JobCancelled => {
                 return Err(Problem::overloaded());
             }

@@ -19,13 +19,10 @@ use super::{blending, ingesting};
 use crate::service::app::App;
 use crate::service::http::{Kind, Problem};
 use crate::service::ids;
-use crate::store::{JobKind, JobRecord, JobState, NewJob};
+use crate::store::{JobKind, JobRecord, JobState, NewJob, StoreError};
 
 /// How often a job is begun before it is given up: each time the process died over it.
 const MOST_ATTEMPTS: u32 = 10;
-
-/// How often the end of a job is written before it is left to the next start.
-const MOST_ENDINGS: u32 = 5;
 
 /// Paints that are held in memory until the store takes them, beside those that hold a lane.
 const MOST_HELD: usize = 8;
@@ -173,19 +170,23 @@ fn start(app: &App, job: JobRecord) {
 
 async fn run(app: App, under_way: Arc<UnderWay>) {
     let job = &under_way.job;
-    let last = match AssertUnwindSafe(run_to_end(&app, &under_way))
-        .catch_unwind()
-        .await
-    {
-        Ok(Ok(ended)) => ended,
-        Ok(Err(problem)) => ended_badly(&app, job, problem).await,
+    let worked = AssertUnwindSafe(work(&app, &under_way)).catch_unwind();
+    let ended = match worked.await {
+        Ok(Ok(ended)) => ended.map(|state| (state, None)),
+        Ok(Err(problem)) => Some((JobState::Failed, Some(problem))),
         Err(_) => {
-            ended_badly(
-                &app,
-                job,
-                Problem::internal(format!("job {} panicked", job.id)),
-            )
-            .await
+            let problem = Problem::internal(format!("job {} panicked", job.id));
+            Some((JobState::Failed, Some(problem)))
+        }
+    };
+    let last = match ended {
+        Some((state, problem)) => end_insisting(&app, &under_way, state, problem).await,
+        None => {
+            // What is left running on record is begun again all the same.
+            if let Err(error) = app.catalogue.return_job(&job.id).await {
+                tracing::warn!(%error, job = job.id, "a job was not returned to the queue");
+            }
+            None
         }
     };
     app.jobs.under_way().remove(&job.id);
@@ -195,28 +196,18 @@ async fn run(app: App, under_way: Arc<UnderWay>) {
     }
 }
 
-async fn ended_badly(app: &App, job: &JobRecord, problem: Problem) -> Option<JobDocument> {
-    end(app, job, JobState::Failed, Some(&problem)).await.ok()
-}
-
-/// Runs a job and records its end; `None` when it goes on after a restart.
-async fn run_to_end(app: &App, under_way: &Arc<UnderWay>) -> Result<Option<JobDocument>, Problem> {
+/// Does the work of a job and says how it ended; `None` when it goes on after a restart.
+async fn work(app: &App, under_way: &Arc<UnderWay>) -> Result<Option<JobState>, Problem> {
     let job = &under_way.job;
+    let called_off = || under_way.is_cancelled().then_some(JobState::Cancelled);
     let lane = tokio::select! {
-        lane = app.jobs.lanes.acquire() => Some(lane.map_err(Problem::internal)?),
-        () = under_way.called_off() => None,
+        lane = app.jobs.lanes.acquire() => lane.map_err(Problem::internal)?,
+        () = under_way.called_off() => return Ok(called_off()),
         () = app.stopped() => return Ok(None),
-    };
-    let Some(lane) = lane else {
-        return end(app, job, JobState::Cancelled, None).await.map(Some);
     };
     let begun = under_way.insist(app, || app.catalogue.begin_job(&job.id));
     if begun.await?.is_err() {
-        return if under_way.is_cancelled() {
-            end(app, job, JobState::Cancelled, None).await.map(Some)
-        } else {
-            Ok(None)
-        };
+        return Ok(called_off());
     }
     under_way
         .told
@@ -225,15 +216,30 @@ async fn run_to_end(app: &App, under_way: &Arc<UnderWay>) -> Result<Option<JobDo
         JobKind::Ingest => ingesting::ingest(app, under_way, lane).await?,
         JobKind::Blend => blending::blend(app, under_way).await?,
     };
-    match ended {
-        Ok(()) => end(app, job, JobState::Done, None).await.map(Some),
-        Err(CalledOff) if under_way.is_cancelled() => {
-            end(app, job, JobState::Cancelled, None).await.map(Some)
-        }
-        Err(CalledOff) => {
-            // The service goes down: the next one begins it again.
-            app.catalogue.return_job(&job.id).await?;
-            Ok(None)
+    Ok(match ended {
+        Ok(()) => Some(JobState::Done),
+        Err(CalledOff) => called_off(),
+    })
+}
+
+/// Records the end of a job however long the store takes; `None` when the service ended before.
+async fn end_insisting(
+    app: &App,
+    under_way: &Arc<UnderWay>,
+    state: JobState,
+    problem: Option<Problem>,
+) -> Option<JobDocument> {
+    let problem = problem.as_ref();
+    let ended = under_way.insist_though_cancelled(app, || end(app, &under_way.job, state, problem));
+    match ended.await {
+        Ok(ended) => ended.ok(),
+        Err(problem) => {
+            tracing::error!(
+                ?problem,
+                job = under_way.job.id,
+                "a job's end is not on record"
+            );
+            None
         }
     }
 }
@@ -244,29 +250,23 @@ async fn end(
     job: &JobRecord,
     state: JobState,
     problem: Option<&Problem>,
-) -> Result<JobDocument, Problem> {
+) -> Result<JobDocument, StoreError> {
     let kind = problem.map(Problem::kind);
     let problem = problem.map(|problem| problem.document(None));
-    let stored = problem
-        .as_ref()
-        .map(serde_json::to_string)
-        .transpose()
-        .map_err(Problem::internal)?;
-    let mut tries = 1;
-    let ended_now = loop {
-        let ended = app.catalogue.end_job(&job.id, state, stored.as_deref());
-        match ended.await {
-            Ok(ended_now) => break ended_now,
-            Err(error) if tries == MOST_ENDINGS => return Err(error.into()),
-            Err(_) => tokio::time::sleep(Duration::from_millis(100 << tries)).await,
-        }
-        tries += 1;
-    };
-    if !ended_now {
+    let stored = problem.as_ref().map(serde_json::to_string).transpose();
+    let stored = stored.map_err(|error| StoreError::Corrupt {
+        what: "problem",
+        detail: error.to_string(),
+    })?;
+    let ended = app.catalogue.end_job(&job.id, state, stored.as_deref());
+    if !ended.await? {
         // It has an end already; that one counts.
-        let job = app.catalogue.job(&job.id).await?;
-        let gone = || Problem::internal("a job that ended is not on record");
-        return job.as_ref().map(JobDocument::of).ok_or_else(gone);
+        let there = app.catalogue.job(&job.id).await?;
+        let gone = || StoreError::Corrupt {
+            what: "job",
+            detail: format!("{} ended and is not on record", job.id),
+        };
+        return there.as_ref().map(JobDocument::of).ok_or_else(gone);
     }
     // The end is on record: what tidying up meets does not change it.
     if let Err(error) = app.catalogue.forget_ended_jobs(JOBS_KEPT).await {

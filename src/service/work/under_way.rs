@@ -1,5 +1,6 @@
 //! A job under way, as the work that it does sees it.
 
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -100,6 +101,40 @@ impl UnderWay {
     where
         F: Future<Output = Result<T, StoreError>>,
     {
+        let called_off = async {
+            tokio::select! {
+                () = self.called_off() => {}
+                () = app.stopped() => {}
+            }
+        };
+        self.ask_until(called_off, ask).await
+    }
+
+    /// The same for what a job that was cancelled has still to say: nothing but the end of the service ends it.
+    ///
+    /// # Errors
+    ///
+    /// As [`UnderWay::insist`].
+    pub async fn insist_though_cancelled<T, F>(
+        &self,
+        app: &App,
+        ask: impl Fn() -> F,
+    ) -> Result<Result<T, CalledOff>, Problem>
+    where
+        F: Future<Output = Result<T, StoreError>>,
+    {
+        self.ask_until(app.stopped(), ask).await
+    }
+
+    async fn ask_until<T, F>(
+        &self,
+        called_off: impl Future<Output = ()>,
+        ask: impl Fn() -> F,
+    ) -> Result<Result<T, CalledOff>, Problem>
+    where
+        F: Future<Output = Result<T, StoreError>>,
+    {
+        let mut called_off = pin!(called_off);
         let stage = self.told.borrow().stage.clone();
         let mut pauses = PAUSES.into_iter();
         loop {
@@ -117,8 +152,7 @@ impl UnderWay {
             let pause = pauses.next().unwrap_or(LONGEST_PAUSE);
             tokio::select! {
                 () = tokio::time::sleep(pause) => {}
-                () = self.called_off() => return Ok(Err(CalledOff)),
-                () = app.stopped() => return Ok(Err(CalledOff)),
+                () = &mut called_off => return Ok(Err(CalledOff)),
             }
         }
     }
