@@ -13,7 +13,7 @@ pub struct Point {
     pub knob: String,
     /// All knobs.
     pub knobs: Profile,
-    /// Wall time, seconds.
+    /// Seconds, of the study's clock.
     pub seconds: f64,
     /// Error, in the front's unit.
     pub error: f64,
@@ -96,16 +96,17 @@ impl Front {
             .filter_map(|&name| Some((name, self.preset(name)?)))
     }
 
-    /// How far above the front a point's error is at its time, as a factor of at least 1.
+    /// What beats a point: takes at most nine tenths of its time for no more error, or as much time for at most nine
+    /// tenths of its error. Of several the most accurate.
     #[must_use]
-    pub fn above_front(&self, point: &Point) -> f64 {
-        let best = self
-            .points
-            .iter()
-            .filter(|p| p.seconds <= point.seconds)
-            .map(|p| p.error)
-            .fold(point.error, f64::min);
-        if best > 0.0 { point.error / best } else { 1.0 }
+    pub fn beaten_by(&self, point: &Point) -> Option<&Point> {
+        let beats = |other: &&Point| {
+            let (time, error) = (other.seconds, other.error);
+            (time <= 0.9 * point.seconds && error <= point.error)
+                || (time <= point.seconds && error <= 0.9 * point.error)
+        };
+        let beating = self.points.iter().filter(beats);
+        beating.min_by(|x, y| x.error.total_cmp(&y.error))
     }
 }
 
@@ -160,9 +161,11 @@ mod tests {
         assert_eq!(on, ["fast", "good", "slow"]);
         assert_eq!(front.knee, "good");
         let beaten = &front.points[2];
-        assert!(
-            (front.above_front(beaten) - 4.5).abs() < 1e-12,
-            "{beaten:?}"
-        );
+        let by = front.beaten_by(beaten).map(|point| point.label.as_str());
+        assert_eq!((beaten.label.as_str(), by), ("beaten", Some("good")));
+        assert!(on.iter().all(|label| {
+            let point = front.points.iter().find(|p| p.label == **label);
+            point.is_some_and(|point| front.beaten_by(point).is_none())
+        }));
     }
 }

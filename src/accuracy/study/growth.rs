@@ -20,6 +20,9 @@ pub struct Growth {
 /// Room for noise in a measured exponent that should be exactly 1.
 const NOISE: f64 = 0.1;
 
+/// Sizes below which a fitted exponent says nothing.
+const LEAST_SIZES: usize = 3;
+
 impl Growth {
     /// Fits the exponent, by least squares on logarithms.
     #[must_use]
@@ -46,6 +49,12 @@ impl Growth {
         }
     }
 
+    /// Whether there are enough sizes to tell an exponent.
+    #[must_use]
+    pub fn is_measured(&self) -> bool {
+        self.points.len() >= LEAST_SIZES
+    }
+
     /// Whether the exponent keeps to its limit, within what such a fit scatters.
     #[must_use]
     pub fn is_within(&self) -> bool {
@@ -64,6 +73,8 @@ mod tests {
             .to_vec();
         let growth = Growth::new("clusters", "", 1.6, points);
         assert!((growth.exponent - 1.4).abs() < 1e-12);
-        assert!(growth.is_within());
+        assert!(growth.is_within() && growth.is_measured());
+        let one = Growth::new("paints", "", 1.0, vec![[2.0, 0.1]]);
+        assert!(!one.is_measured());
     }
 }

@@ -65,11 +65,12 @@ fn all() -> usize {
     rayon::current_num_threads()
 }
 
-/// Each profile once, under the first of its labels.
-fn distinct(settings: Vec<Setting>) -> Vec<Setting> {
+/// Each profile once, under the first of its labels; `read` gives the part of a profile that the work looks at.
+fn distinct<T: PartialEq>(settings: Vec<Setting>, read: impl Fn(&Profile) -> T) -> Vec<Setting> {
     let mut kept: Vec<Setting> = Vec::with_capacity(settings.len());
     for setting in settings {
-        if kept.iter().all(|other| other.profile != setting.profile) {
+        let own = read(&setting.profile);
+        if kept.iter().all(|other| read(&other.profile) != own) {
             kept.push(setting);
         }
     }

@@ -45,7 +45,7 @@ fn blend_of(paints: &[PaintFile], goes: usize) -> Result<f64, WorkshopError> {
     shortest(goes, rayon::current_num_threads(), go).map(|(seconds, _)| seconds)
 }
 
-/// Blending paints of which every so many-th slice is left: the angles stay spread over the same range.
+/// Blending paints of which every n-th slice is left: the angles stay spread over the same range.
 fn slices(material: &mut Material, goes: usize) -> Result<Growth, WorkshopError> {
     let standard = Profile::standard().flakes;
     let whole: Vec<PaintFile> = material.fitted(&standard, 2)?.to_vec();

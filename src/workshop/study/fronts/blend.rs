@@ -27,7 +27,7 @@ fn turned_together() -> Vec<Setting> {
             let label = if step == 1 {
                 format!("{n} clusters, {how}")
             } else {
-                format!("{n} clusters, {how}, every {step}. angle")
+                format!("{n} clusters, {how}, 1 of {step} angles")
             };
             let profile = Profile {
                 flakes: clustered(n, BoxRule::Moments, step),
@@ -77,13 +77,13 @@ pub(in crate::workshop::study) fn blend(
     }
     for step in [2, 4] {
         let flakes = clustered(50, BoxRule::Moments, step);
-        let label = format!("every {step}. angle");
+        let label = format!("1 of {step} angles");
         settings.push(setting(label, "angle_step", with_flakes(flakes)));
     }
     if !options.quick {
         settings.extend(turned_together());
     }
-    let settings = distinct(settings);
+    let settings = distinct(settings, |profile| (profile.flakes, profile.blend));
     let count = settings.len();
     let (mut points, mut without) = (Vec::with_capacity(count), Vec::new());
     for (k, of) in settings.into_iter().enumerate() {

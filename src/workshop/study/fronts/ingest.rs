@@ -25,14 +25,14 @@ pub(in crate::workshop::study) fn ingest(
             vec![12, 24, 50, 100]
         } {
             let flakes = clustered(n, BoxRule::Moments, step);
-            let label = format!("{n} clusters, every {step}. angle");
+            let label = format!("{n} clusters, 1 of {step} angles");
             let knob = if n == 50 { "angle_step" } else { "together" };
             settings.push(setting(label, knob, with_flakes(flakes)));
         }
     }
     let tight = clustered(50, BoxRule::Tight, 1);
     settings.push(setting("tight boxes", "box_rule", with_flakes(tight)));
-    let settings = distinct(settings);
+    let settings = distinct(settings, |profile| profile.flakes);
     let (count, goes) = (settings.len(), if options.quick { 1 } else { 2 });
     let mut points = Vec::with_capacity(count);
     for (k, of) in settings.into_iter().enumerate() {

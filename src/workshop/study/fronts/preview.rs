@@ -20,7 +20,7 @@ pub(in crate::workshop::study) fn preview(
     let samples: &[u32] = if options.quick {
         &[1, 4, 16, 64]
     } else {
-        &[1, 2, 4, 8, 16, 32, 64, 128, 256]
+        &[1, 2, 4, 8, 16, 32, 64, 128, 256, 512]
     };
     let finest = 16 * samples[samples.len() - 1].min(if options.quick { 64 } else { 128 });
     let standard = Profile::standard();
@@ -53,7 +53,8 @@ pub(in crate::workshop::study) fn preview(
         ..Profile::reference()
     };
     let (_, truth) = draw(material, &reference, side, 1, 7)?;
-    let settings = distinct(settings);
+    let read = |profile: &Profile| (profile.flakes, profile.blend, profile.samples_per_pixel);
+    let settings = distinct(settings, read);
     let count = settings.len();
     let mut points = Vec::with_capacity(count);
     for (k, of) in settings.into_iter().enumerate() {
@@ -75,8 +76,8 @@ pub(in crate::workshop::study) fn preview(
     let about = format!("Preview: a ball of {side} x {side} pixels");
     let error_is = format!(
         "The error is the mean CIEDE2000 over all pixels from a picture with {finest} samples a pixel by the `reference` \
-         profile. Beside it stand the difference that 95 % of the pixels keep within, and FLIP (0 to 1). Time grows in \
-         proportion to the number of pixels; a website's picture has 16 times as many."
+         profile. Beside it stand the difference that 95 % of the pixels keep within, and FLIP (0 to 1). How time \
+         grows with pixels stands below."
     );
     Ok(Front::new(
         "preview",

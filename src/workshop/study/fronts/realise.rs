@@ -59,7 +59,8 @@ pub(in crate::workshop::study) fn realise(
         &[12, 24, 100, 200]
     };
     settings.extend(with_clusters(counts));
-    let settings = distinct(settings);
+    let read = |profile: &Profile| (profile.flakes, profile.blend, profile.export);
+    let settings = distinct(settings, read);
     let (count, goes) = (settings.len(), if options.quick { 2 } else { 7 });
     let mut points = Vec::with_capacity(count);
     for (k, of) in settings.into_iter().enumerate() {
@@ -86,7 +87,8 @@ pub(in crate::workshop::study) fn realise(
         "Realise: a blend at given weights becomes a texture bundle",
         "The error is that of the blend plus the rounding of the corners in the file. The time is from a blend in memory to \
          the bytes of the bundle. Flakes drawn by the 500-step inverse CDF lose rare clusters; the share of draws that are \
-         lost stands beside the error. The alias table loses none.",
+         lost stands beside the error. The alias table loses none; the presets write both, for shaders that have nothing but \
+         the steps.",
         "Lab",
         points,
     ))
