@@ -74,6 +74,8 @@ const REALISED: &str = "bounded: error of the blend that a paint was realised fr
 const UNKNOWN: &str =
     "not known: the paint was not clustered here from pictures, or by an older version";
 const TRANSPORT: &str = "bounded: mean excess of the plans' cost over the dual bound; of several pairs of paints the worst";
+const TRANSPORT_SAMPLED: &str = "bounded on slices spread evenly over the angles: mean excess of the plans' cost over the dual bound of each pair alone; of \
+                                 several pairs of paints the worst";
 const ANGLES: &str = "measured: W1 of lightness between slices left out and the mixtures in their place, nine of ten of the \
                       compared slices are within; of several paints the worst";
 const ROUNDING: &str = "bounded: W1 between the boxes and the boxes read back, worst of the slices at the instrument geometries";
@@ -109,7 +111,15 @@ pub fn blend_error(blend: &Blend) -> ResultError {
         Term {
             what: "transport",
             lab: Some(worst.fold(0.0, f64::max)),
-            how: TRANSPORT,
+            how: if report
+                .pairs
+                .iter()
+                .all(|pair| pair.checked == report.slices)
+            {
+                TRANSPORT
+            } else {
+                TRANSPORT_SAMPLED
+            },
         },
     ];
     terms.extend(left_out.map(|lab| Term {

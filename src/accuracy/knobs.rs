@@ -45,7 +45,7 @@ pub struct Knobs {
         skip_serializing_if = "Option::is_none"
     )]
     pub box_rule: Option<BoxRule>,
-    /// Every so many-th measured angle is used, 1 to 16.
+    /// Every n-th measured angle is used, 1 to 16.
     #[serde(
         default,
         deserialize_with = "read::angle_step",
@@ -178,6 +178,24 @@ impl Knobs {
         }
     }
 
+    /// A profile as it can be asked for: a preset's name, or `standard` and the knobs that are turned otherwise.
+    #[must_use]
+    pub fn told(profile: &Profile) -> String {
+        let knobs = |profile: &Profile| match serde_json::to_value(Self::of(profile)) {
+            Ok(serde_json::Value::Object(knobs)) => knobs,
+            _ => serde_json::Map::new(),
+        };
+        let standard = knobs(&Profile::standard());
+        let turned = knobs(profile).into_iter().filter_map(|(knob, value)| {
+            let text = (value.as_str()).map_or_else(|| value.to_string(), str::to_owned);
+            (standard.get(&knob) != Some(&value)).then(|| format!(",{knob}={text}"))
+        });
+        match profile.name() {
+            "custom" => turned.fold("standard".to_owned(), |all, one| all + &one),
+            name => name.to_owned(),
+        }
+    }
+
     /// The profile that these knobs mean.
     ///
     /// # Errors
@@ -255,6 +273,24 @@ impl Knobs {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_profile_is_told_as_it_can_be_asked_for() {
+        assert_eq!(Knobs::told(&Profile::draft()), "draft");
+        for text in [
+            "standard,precision=f32",
+            "standard,clusters=100,transport=greedy",
+        ] {
+            let profile: Profile = text.parse().expect("a profile");
+            let told = Knobs::told(&profile);
+            assert_eq!(
+                told.parse::<Profile>().expect("a profile"),
+                profile,
+                "{told}"
+            );
+            assert_eq!(told.len(), text.len(), "{told}");
+        }
+    }
 
     #[test]
     fn knobs_are_turned_one_by_one_and_the_others_stay() {

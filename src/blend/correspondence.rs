@@ -53,6 +53,9 @@ pub struct CorrespondenceReport {
     pub mean_cost: f64,
     /// Largest gap of a slice between its plan and the dual bound: no plan is further from optimal.
     pub largest_gap: f64,
+    /// Slices that [`Method::Sinkhorn`] had to smooth more than asked, to converge.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub smoothed_more: usize,
     /// Order in which the paints were joined, by place in hash order.
     #[serde(default)]
     pub order: Vec<usize>,
@@ -75,6 +78,7 @@ pub(super) struct SliceBlend {
     pub boxes: Vec<Vec<([f32; 3], [f32; 3])>>,
     pub cost: f64,
     pub gap: f64,
+    pub smoothed_more: bool,
 }
 
 /// Memory of one thread.
@@ -185,6 +189,7 @@ pub(super) fn correspond(
         offsets.push(u32::try_from(probability.len()).unwrap_or(u32::MAX));
         report.mean_cost += slice.cost;
         report.largest_gap = report.largest_gap.max(slice.gap);
+        report.smoothed_more += usize::from(slice.smoothed_more);
     }
     #[allow(clippy::cast_precision_loss)] // a count of slices
     let slices = count as f64;
@@ -230,14 +235,16 @@ fn join_in_order(
     settings: &BlendSettings,
     tell: &(dyn Fn() + Sync),
 ) -> Result<Vec<SliceBlend>, BlendError> {
-    (0..grid.slices())
+    let slices: Vec<_> = (0..grid.slices())
         .into_par_iter()
         .map_init(Bench::default, |bench, k| {
             let slice = blend_slice(paints, order, grid.angles(k), settings, bench);
             tell();
             slice.map_err(|source| grid.refused(k, source))
         })
-        .collect()
+        .collect();
+    // The first that was refused, on any number of threads.
+    slices.into_iter().collect()
 }
 
 /// Grain and lifetime of each paint; one without flakes has the mean of those that have.
@@ -281,6 +288,7 @@ fn blend_slice(
         boxes: vec![bench.clusters.iter().map(|c| (c.lower, c.upper)).collect()],
         cost: 0.0,
         gap: 0.0,
+        smoothed_more: false,
     };
     for (joined, &place) in order.iter().enumerate().skip(1) {
         // The same paint once more moves nothing: whatever share it has, its flakes go where they went before.
@@ -295,17 +303,42 @@ fn blend_slice(
             (0..slice.probability.len()).map(|k| (slice.even_center(k), slice.probability[k]));
         let target = bench.clusters.iter().map(|c| (c.center(), c.probability));
         bench.problem.refill(source, target)?;
-        settings.method.solve_into(
-            &bench.problem,
-            settings.cost,
-            &mut bench.workspace,
-            &mut bench.plan,
-        )?;
+        slice.smoothed_more |= solve_somehow(settings, bench)?;
         slice.join(&bench.plan, &bench.clusters);
     }
     slice.sort_by_lightness();
     slice.put_back(order);
     Ok(slice)
+}
+
+/// By how much more a slice is smoothed that does not converge.
+const SMOOTHER: f64 = 4.0;
+
+/// Solves the problem at hand; says whether it had to be smoothed more than asked. How far that is from the optimum the
+/// plan's gap tells.
+fn solve_somehow(settings: &BlendSettings, bench: &mut Bench) -> Result<bool, TransportError> {
+    let mut method = settings.method;
+    loop {
+        let solved = method.solve_into(
+            &bench.problem,
+            settings.cost,
+            &mut bench.workspace,
+            &mut bench.plan,
+        );
+        match (solved, &mut method) {
+            (Err(TransportError::NotConverged { .. }), Method::Sinkhorn { epsilon })
+                if *epsilon < 1.0 =>
+            {
+                *epsilon *= SMOOTHER;
+            }
+            (solved, _) => return solved.map(|()| method != settings.method),
+        }
+    }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // as serde asks
+fn is_none(count: &usize) -> bool {
+    *count == 0
 }
 
 impl SliceBlend {

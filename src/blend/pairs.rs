@@ -5,8 +5,8 @@
 //! ```
 //!
 //! in distances, Lab units, whatever cost the correspondence was found with, so that `gap = cost − dual bound` bounds the
-//! pair's excess and can be compared. Of two paints whose distance was minimised it is the gap of the plans themselves,
-//! over all slices. Otherwise pairs are transported alone, exactly, on at most [`CHECKED`] slices spread evenly over the
+//! pair's excess and can be compared. Of two paints whose distance was minimised exactly it is the gap of the plans
+//! themselves, over all slices. Otherwise pairs are transported alone, exactly, on at most [`CHECKED`] slices spread evenly over the
 //! grid; the report says how many.
 
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ use super::{BlendError, correspondence};
 use crate::paint::CarPaint;
 use crate::transport::{Cost, Method, Solver};
 
-/// Most slices on which pairs of three and more paints are transported alone.
+/// Most slices on which pairs are transported alone.
 pub(super) const CHECKED: usize = 64;
 
 /// How well two paints of a blend correspond.
@@ -54,7 +54,8 @@ pub(super) fn pair_reports(
                 .collect();
             #[allow(clippy::cast_precision_loss)] // a count of slices
             let mean_cost = costs.iter().sum::<f64>() / count.max(1) as f64;
-            let gaps: Vec<f64> = if order.len() == 2 && settings.cost == Cost::Distance {
+            let exact = settings.method == Method::Exact && settings.cost == Cost::Distance;
+            let gaps: Vec<f64> = if order.len() == 2 && exact {
                 slices.iter().map(|s| s.gap).collect()
             } else {
                 let step = count.div_ceil(CHECKED).max(1);

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::gltf_bake::{Baked, bake};
 use super::gltf_brdf::{GltfMaterial, dielectric_f0};
-use super::gltf_fit::{fit, loss};
+use super::gltf_fit::{LossReport, fit, loss};
 use super::gltf_material::{extras, material_json};
 use super::gltf_mesh::{Mesh, ball};
 use super::{About, ExportError};
@@ -21,6 +21,15 @@ use crate::paint::{CarPaint, Flakes, RandomTexture, Reflectance};
 ///
 /// [`ExportError`] for a number that is not finite, or a picture that cannot be encoded.
 pub fn glb(paint: &CarPaint, about: &About) -> Result<Vec<u8>, ExportError> {
+    glb_and_loss(paint, about).map(|(bytes, _)| bytes)
+}
+
+/// The same, and how far its material is from the paint.
+///
+/// # Errors
+///
+/// As [`glb`].
+pub fn glb_and_loss(paint: &CarPaint, about: &About) -> Result<(Vec<u8>, LossReport), ExportError> {
     let reflectance = Reflectance::new(paint);
     let (mut material, mut report) = fit(&reflectance);
     let mut file = Builder::default();
@@ -66,7 +75,8 @@ pub fn glb(paint: &CarPaint, about: &About) -> Result<Vec<u8>, ExportError> {
         document["samplers"] =
             json!([{ "magFilter": 9729, "minFilter": 9987, "wrapS": 10497, "wrapT": 10497 }]);
     }
-    Ok(chunks(&serde_json::to_vec(&document)?, &file.body))
+    let bytes = chunks(&serde_json::to_vec(&document)?, &file.body);
+    Ok((bytes, report))
 }
 
 /// The base color that shows as much between texels of differing F0 as the fitted one under their mean.

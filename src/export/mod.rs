@@ -41,7 +41,7 @@ pub use blend_bundle::blend_bundle;
 pub use bundle::{bundle, companions_hash};
 pub use clamp::Clamped;
 pub use cxf::CXF_MEDIA_TYPE;
-pub use glb::glb;
+pub use glb::{glb, glb_and_loss};
 pub use gloss::{Gloss, gloss};
 pub use gltf_brdf::GltfMaterial;
 pub use gltf_fit::LossReport;

@@ -1,8 +1,8 @@
 //! A target in place of knobs: the cheapest profile that is accurate enough, or the most accurate that is fast enough.
 //!
-//! The profiles of a short ladder are estimated on the work itself, from cheap to dear until one will do; where an
-//! estimate's error is of a sample of the slices, the error is measured in full before a profile is picked for it. What
-//! is picked for a time limit depends on the machine; the result depends on the profile picked and on nothing else.
+//! The profiles of a short ladder are estimated on the work itself: for an error from cheap to dear until one will do, for
+//! a time from the usual one on. Where an estimate's error is of a sample of the slices, the error is measured in full
+//! before a profile is picked for it. What is picked for a time limit depends on the machine; the result depends on the profile picked and on nothing else.
 
 mod samples;
 
@@ -12,10 +12,11 @@ use serde::Serialize;
 
 use super::estimate::{Estimate, Work};
 use super::realising::{Format, choose, error_of};
-use super::{WorkshopError, blend_paints};
-use crate::accuracy::{Profile, blend_error, file_error, writing_error};
+use super::{IngestOptions, WorkshopError, blend_paints, open_paints};
+use crate::accuracy::{Knobs, Profile, blend_error, file_error, writing_error};
 use crate::export::{ExportSettings, Precision};
 use crate::fit::ClusterSettings;
+use crate::paint::PaintFile;
 
 /// What a result should keep to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -42,6 +43,9 @@ pub struct Picked {
     /// Seconds that took.
     pub searched: f64,
 }
+
+/// Part of a time limit after which no more accurate profile is looked for.
+const SEARCH_SHARE: f64 = 0.25;
 
 /// A search for a profile, and when it began.
 struct Search(Instant);
@@ -70,16 +74,11 @@ impl Picked {
     /// In one line.
     #[must_use]
     pub fn line(&self) -> String {
-        let Estimate {
-            profile,
-            seconds,
-            error,
-            ..
-        } = &self.estimate;
+        let Estimate { seconds, error, .. } = &self.estimate;
         format!(
-            "{}; profile={profile}, samples_per_pixel={}, error={error}, seconds={seconds:.3}, searched={:.3}",
+            "{}; profile={}, error={error}, seconds={seconds:.3}, searched={:.3}",
             if self.met { "met" } else { "not met" },
-            self.profile().samples_per_pixel,
+            Knobs::told(self.profile()),
             self.searched,
         )
     }
@@ -130,29 +129,87 @@ impl Target {
     /// [`WorkshopError`] for limits that are none, and for what would be refused when the work is done.
     pub fn pick(&self, work: &Work<'_>) -> Result<Picked, WorkshopError> {
         self.check()?;
+        if let (
+            Work::Realise {
+                format: Format::Glb,
+                ..
+            },
+            Some(most),
+        ) = (work, self.max_error)
+        {
+            let problem = format!(
+                "max_error is {most} for a GLB, whose material is fitted: what that loses stands in the file and in no \
+                 profile's hands, accepted are max_seconds, and max_error of zip, json and paint"
+            );
+            return Err(WorkshopError::usage("max_error", problem));
+        }
         let search = Search(Instant::now());
         if let Work::Preview(picture) = work {
             return samples::pick_samples(self, picture, &search);
         }
-        let mut estimates = Vec::new();
-        // From cheap to dear: what comes after one that is accurate enough, or too slow, need not be looked at.
-        for profile in ladder(work) {
-            let mut estimate = work.estimate(&profile)?;
-            let too_slow = !self.is_in_time(&estimate, search.seconds());
-            if self.max_error.is_some() && !too_slow {
-                measure_error(work, &profile, &mut estimate)?;
-            }
-            let enough = self.max_error.is_some() && self.is_met(&estimate, search.seconds());
-            estimates.push(estimate);
-            if enough || too_slow {
-                break;
-            }
-        }
+        let estimates = match self.max_error {
+            Some(_) => self.accurate_enough(work, &search)?,
+            None => self.fast_enough(work, &search)?,
+        };
         let (tried, searched) = (estimates.len(), search.seconds());
         let estimate = self
             .best(estimates, searched)
             .ok_or_else(|| WorkshopError::internal("there is no profile to pick from"))?;
         Ok(self.picked(estimate, tried, searched))
+    }
+
+    /// Estimates from cheap to dear: what comes after one that is accurate enough, or too slow, is not looked at.
+    fn accurate_enough(
+        &self,
+        work: &Work<'_>,
+        search: &Search,
+    ) -> Result<Vec<Estimate>, WorkshopError> {
+        let mut estimates = Vec::new();
+        for profile in ladder(work) {
+            let mut estimate = work.estimate(&profile)?;
+            let too_slow = !self.is_in_time(&estimate, search.seconds());
+            if !too_slow {
+                measure_error(work, &profile, &mut estimate)?;
+            }
+            let enough = self.is_met(&estimate, search.seconds());
+            estimates.push(estimate);
+            if enough || too_slow {
+                break;
+            }
+        }
+        Ok(estimates)
+    }
+
+    /// Estimates of the usual profile and of those around it, from cheap to dear: upwards while they are fast enough and
+    /// the search has taken little of the time, downwards until one is.
+    fn fast_enough(
+        &self,
+        work: &Work<'_>,
+        search: &Search,
+    ) -> Result<Vec<Estimate>, WorkshopError> {
+        let most = self.max_seconds.unwrap_or(f64::INFINITY);
+        let ladder = ladder(work);
+        let usual = ladder.iter().position(|own| *own == Profile::standard());
+        let (cheaper, others) = ladder.split_at(usual.unwrap_or(0));
+        let mut estimates = Vec::new();
+        for profile in others {
+            let estimate = work.estimate(profile)?;
+            let too_slow = !self.is_in_time(&estimate, search.seconds());
+            estimates.push(estimate);
+            if too_slow || search.seconds() > SEARCH_SHARE * most {
+                break;
+            }
+        }
+        let is_in_time = |estimate: &Estimate| self.is_in_time(estimate, search.seconds());
+        if !estimates.first().is_some_and(is_in_time) {
+            for profile in cheaper.iter().rev() {
+                estimates.insert(0, work.estimate(profile)?);
+                if is_in_time(&estimates[0]) {
+                    break;
+                }
+            }
+        }
+        Ok(estimates)
     }
 
     fn picked(&self, estimate: Estimate, tried: usize, searched: f64) -> Picked {
@@ -169,11 +226,8 @@ impl Target {
     /// most accurate; where none does, the most accurate in time, and where none is in time, the cheapest.
     fn best(&self, estimates: Vec<Estimate>, searched: f64) -> Option<Estimate> {
         let error_of = |e: &Estimate| e.error.value.unwrap_or(f64::INFINITY);
-        let finer = |x: &Estimate, y: &Estimate| {
-            error_of(x)
-                .total_cmp(&error_of(y))
-                .then(x.seconds.total_cmp(&y.seconds))
-        };
+        // Of equals the first, which is the cheapest whatever the clock says.
+        let finer = |x: &Estimate, y: &Estimate| error_of(x).total_cmp(&error_of(y));
         let in_time: Vec<Estimate> = (estimates.iter())
             .filter(|e| self.is_in_time(e, searched))
             .cloned()
@@ -213,6 +267,14 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
             ..standard
         })
         .collect(),
+        // Paints have the clusters that they have, unless they came of a blend.
+        Work::Blend { paints } if paints.iter().all(|paint| !paint.provenance.is_blend()) => vec![
+            Profile {
+                flakes: clustered(standard.flakes.clusters, 2),
+                ..standard
+            },
+            standard,
+        ],
         Work::BlendNames { .. } | Work::Blend { .. } => {
             let by = |clusters| Profile {
                 flakes: clustered(clusters, 1),
@@ -270,8 +332,17 @@ fn measure_error(
                 .flatten();
             estimate.error.value = file_error(&error_of(thing, weights), writing.as_ref()).lab;
         }
+        Work::BlendNames { names, options } => {
+            let options = IngestOptions {
+                profile: *profile,
+                ..options.clone()
+            };
+            let paints = open_paints(names, &options, &|_| ())?;
+            let paints: Vec<&PaintFile> = paints.iter().collect();
+            measure_error(&Work::Blend { paints: &paints }, profile, estimate)?;
+        }
         // Ingest and preview are compared on the very slices and pixels that the result is compared on.
-        Work::Ingest { .. } | Work::BlendNames { .. } | Work::Preview(_) => {}
+        Work::Ingest { .. } | Work::Preview(_) => {}
     }
     Ok(())
 }

@@ -10,8 +10,6 @@ use crate::workshop::{MOST_SAMPLES, WorkshopError};
 
 /// Samples per pixel that the error is measured with first.
 const FIRST: u32 = 16;
-/// Most samples per pixel.
-const MOST_OF_PIXEL: u32 = 4096;
 /// How often a number is reckoned and measured.
 const GOES: usize = 4;
 /// Share of the error allowed that is aimed at, and that is near enough.
@@ -35,8 +33,8 @@ pub(super) fn pick_samples(
     search: &Search,
 ) -> Result<Picked, WorkshopError> {
     let [width, height] = picture.options.size.map(u64::from);
-    let most = (MOST_SAMPLES / (width * height).max(1)).clamp(1, u64::from(MOST_OF_PIXEL));
-    #[allow(clippy::cast_possible_truncation)] // at most 4096
+    let most = (MOST_SAMPLES / (width * height).max(1)).clamp(1, picture.limits.samples.into());
+    #[allow(clippy::cast_possible_truncation)] // at most the limit
     let most = most as u32;
     let few = FIRST.min(most);
     let small = SmallPictures::to_search(picture, few)?;
@@ -46,31 +44,46 @@ pub(super) fn pick_samples(
         let error = picture.error_of(samples)?;
         Ok::<_, WorkshopError>(Measured { samples, error })
     };
+    let begun = search.seconds();
     let first = measure(few)?;
-    let wanted = match target.max_error {
-        Some(allowed) => samples_for(allowed, first, most, &mut measure)?,
-        None => scaled(first, most),
-    };
-    // What is left when all this has been found out.
-    let in_time = |samples: u32| {
-        let seconds = small.seconds(picture, samples);
-        target
-            .max_seconds
-            .is_none_or(|most| search.seconds() + MARGIN * seconds <= most)
-    };
-    let chosen = if in_time(wanted.samples) {
-        wanted
-    } else {
-        let (mut fits, mut too_many) = (0, wanted.samples);
-        while too_many - fits > 1 {
-            let middle = fits.midpoint(too_many);
-            if in_time(middle) {
-                fits = middle;
+    let seconds_a_sample = (search.seconds() - begun) / f64::from(few);
+    // Most that are drawn in what is left of the time, if something else takes so many seconds before.
+    let in_time = |before: f64| {
+        let fits = |samples: u32| {
+            let seconds = small.seconds(picture, samples);
+            target
+                .max_seconds
+                .is_none_or(|most| search.seconds() + before + MARGIN * seconds <= most)
+        };
+        if fits(most) {
+            return most;
+        }
+        let (mut fit, mut too_many) = (0, most);
+        while too_many - fit > 1 {
+            let middle = fit.midpoint(too_many);
+            if fits(middle) {
+                fit = middle;
             } else {
                 too_many = middle;
             }
         }
-        scaled(first, fits.max(1))
+        fit
+    };
+    let wanted = match target.max_error {
+        // What leaves no time for a picture of as many samples is not measured.
+        Some(allowed) => samples_for(allowed, first, most, &mut |samples| {
+            let takes = seconds_a_sample * f64::from(samples);
+            let worth_it = samples <= in_time(takes);
+            worth_it.then(|| measure(samples)).transpose()
+        })?,
+        None => scaled(first, most),
+    };
+    // What is left when all this has been found out.
+    let left = in_time(0.0);
+    let chosen = if wanted.samples <= left {
+        wanted
+    } else {
+        scaled(first, left.max(1))
     };
     let profile = Profile {
         samples_per_pixel: chosen.samples,
@@ -86,12 +99,13 @@ fn scaled(of: Measured, samples: u32) -> Measured {
     Measured { samples, error }
 }
 
-/// About the least number of samples that leaves no more than this to chance; `most` where none does.
+/// About the least number of samples that leaves no more than this to chance; `most` where none does. A number that
+/// `measure` does not measure is taken for what it should leave.
 fn samples_for(
     allowed: f64,
     first: Measured,
     most: u32,
-    measure: &mut impl FnMut(u32) -> Result<Measured, WorkshopError>,
+    measure: &mut impl FnMut(u32) -> Result<Option<Measured>, WorkshopError>,
 ) -> Result<Measured, WorkshopError> {
     let mut at = first;
     let mut enough: Option<Measured> = None;
@@ -107,7 +121,10 @@ fn samples_for(
         if near || next == at.samples || worse {
             break;
         }
-        at = measure(next)?;
+        let Some(measured) = measure(next)? else {
+            return Ok(enough.unwrap_or_else(|| scaled(at, next)));
+        };
+        at = measured;
     }
     if at.error <= allowed && enough.is_none_or(|least| at.samples < least.samples) {
         enough = Some(at);
@@ -115,7 +132,7 @@ fn samples_for(
     match enough {
         Some(enough) => Ok(enough),
         None if at.samples == most => Ok(at),
-        None => measure(most),
+        None => Ok(measure(most)?.unwrap_or_else(|| scaled(at, most))),
     }
 }
 
@@ -128,12 +145,12 @@ mod tests {
         // A little slower than the root, as low-discrepancy points beside flakes are not.
         let mut measure = |samples: u32| {
             asked += 1;
-            Ok(Measured {
+            Ok(Some(Measured {
                 samples,
                 error: 6.0 * f64::from(samples).powf(-0.45),
-            })
+            }))
         };
-        let first = measure(16).expect("measured");
+        let first = measure(16).expect("measured").expect("measured");
         let found = samples_for(allowed, first, most, &mut measure).expect("found");
         (found, asked)
     }
@@ -150,6 +167,18 @@ mod tests {
             );
             assert!(asked <= GOES + 2);
         }
+    }
+
+    #[test]
+    fn what_there_is_no_time_to_measure_is_reckoned() {
+        let first = Measured {
+            samples: 16,
+            error: 2.0,
+        };
+        let found = samples_for(1.0, first, 4096, &mut |_| Ok(None)).expect("reckoned");
+        // Four times the samples halve the error; a twentieth less than is allowed is aimed at.
+        assert!((64..=72).contains(&found.samples), "{found:?}");
+        assert!(found.error <= 1.0, "{found:?}");
     }
 
     #[test]
