@@ -8,8 +8,8 @@
 //! so that the loop is as plain as `a·X + b·Y`. On the way the signs of `l' − l` are gathered: only a block in which
 //! extrapolation turned a box inside out is gone through again, number by number, to put its corners in order. Whether
 //! a sum can leave ±[`MAX_LAB`] at all follows from the weights and the farthest corner, before anything is summed; if
-//! it can, or a weight is large, every number is summed in 64 bits and held. Boxes are not clamped to `L >= 0`, because
-//! the light they stand for is clamped once, when it is evaluated.
+//! it can, a block that left is gone through in the same way. Where a weight is large, every number is summed in 64 bits.
+//! Boxes are not clamped to `L >= 0`, because the light they stand for is clamped once, when it is evaluated.
 
 use super::clamp::Ledger;
 use super::{BlendedFlakes, Boxes};
@@ -22,6 +22,9 @@ const BLOCK: usize = 768;
 const MODERATE: f64 = 4.0;
 /// What rounding may add to a 32-bit sum of five products: relative, 2^-24 for every product, sum and weight.
 const ROUNDING: f64 = 1.0 + 11.0 * 6e-8;
+
+/// Bits of a number without its sign.
+const MAGNITUDE: u32 = 0x7fff_ffff;
 
 /// How many corners had to be mended, and the worst of them.
 #[derive(Debug, Default, PartialEq)]
@@ -91,15 +94,16 @@ pub(super) fn mix_boxes(flakes: &BlendedFlakes, weights: &[[f64; 3]], out: &mut 
     }
     let largest = |axis: usize| weights.iter().map(|w| w[axis].abs()).sum::<f64>();
     let size = largest(0).max(largest(1)).max(largest(2));
-    let held = size * f64::from(flakes.reach) * ROUNDING <= MAX_LAB;
-    if !held || weights.iter().flatten().any(|w| w.abs() > MODERATE) {
+    let farthest = size * f64::from(flakes.reach) * ROUNDING;
+    if farthest.is_infinite() || weights.iter().flatten().any(|w| w.abs() > MODERATE) {
         return wide(&flakes.boxes, weights, out);
     }
+    let leaves = farthest > MAX_LAB;
     match flakes.boxes.as_slice() {
-        [a, b] => narrow([a, b], weights, out),
-        [a, b, c] => narrow([a, b, c], weights, out),
-        [a, b, c, d] => narrow([a, b, c, d], weights, out),
-        [a, b, c, d, e] => narrow([a, b, c, d, e], weights, out),
+        [a, b] => narrow([a, b], weights, leaves, out),
+        [a, b, c] => narrow([a, b, c], weights, leaves, out),
+        [a, b, c, d] => narrow([a, b, c, d], weights, leaves, out),
+        [a, b, c, d, e] => narrow([a, b, c, d, e], weights, leaves, out),
         _ => wide(&flakes.boxes, weights, out),
     }
 }
@@ -120,24 +124,26 @@ fn wide(paints: &[Boxes], weights: &[[f64; 3]], out: &mut Boxes) -> Account {
     account
 }
 
-/// Sums in 32 bits that stay in range.
+/// Sums in 32 bits; `leaves` says whether one of them may leave the range.
 fn narrow<const PAINTS: usize>(
     paints: [&Boxes; PAINTS],
     weights: &[[f64; 3]],
+    leaves: bool,
     out: &mut Boxes,
 ) -> Account {
     #[allow(clippy::cast_possible_truncation)] // moderate weights of texels
     let weights: [[f32; 3]; PAINTS] = std::array::from_fn(|m| weights[m].map(|w| w as f32));
     if weights.iter().all(|w| *w == [w[0]; 3]) {
-        return blocks(paints, &weights.map(|w| w[0]), out);
+        return blocks(paints, &weights.map(|w| w[0]), leaves, out);
     }
     let patterns: [[f32; BLOCK]; PAINTS] = weights.map(|axes| std::array::from_fn(|k| axes[k % 3]));
-    blocks(paints, &patterns, out)
+    blocks(paints, &patterns, leaves, out)
 }
 
 fn blocks<const PAINTS: usize>(
     paints: [&Boxes; PAINTS],
     weights: &[impl Weight; PAINTS],
+    leaves: bool,
     out: &mut Boxes,
 ) -> Account {
     let mut account = Account::default();
@@ -145,14 +151,20 @@ fn blocks<const PAINTS: usize>(
     for first in (0..lower.len()).step_by(BLOCK) {
         let here = first..(first + BLOCK).min(lower.len());
         let (low, high) = (&mut lower[here.clone()], &mut upper[here.clone()]);
-        let ordered = sums(
-            weights,
+        let [lower, upper] = [
             paints.map(|own| &own.lower.as_flattened()[here.clone()]),
             paints.map(|own| &own.upper.as_flattened()[here.clone()]),
-            low,
-            high,
-        );
-        if !ordered {
+        ];
+        let (ordered, farthest) = if leaves {
+            sums::<PAINTS, true>(weights, lower, upper, low, high)
+        } else {
+            sums::<PAINTS, false>(weights, lower, upper, low, high)
+        };
+        if f64::from(farthest) > MAX_LAB {
+            for (low, high) in low.iter_mut().zip(high) {
+                [*low, *high] = account.mended([*low, *high].map(f64::from));
+            }
+        } else if !ordered {
             account.put_in_order(low, high);
         }
     }
@@ -178,21 +190,22 @@ impl Weight for [f32; BLOCK] {
     }
 }
 
-/// Both corners of a block of at most [`BLOCK`] numbers, and whether no box is inside out.
+/// Both corners of a block of at most [`BLOCK`] numbers, whether no box is inside out, and, if `WATCH`ed, the largest
+/// magnitude.
 ///
 /// A function of its own: its two outputs are known to be apart from everything else, so that the loop becomes vectors.
 #[inline(never)]
-fn sums<const PAINTS: usize>(
+fn sums<const PAINTS: usize, const WATCH: bool>(
     weights: &[impl Weight; PAINTS],
     lower: [&[f32]; PAINTS],
     upper: [&[f32]; PAINTS],
     low: &mut [f32],
     high: &mut [f32],
-) -> bool {
+) -> (bool, f32) {
     let count = low.len().min(BLOCK);
     let (low, high) = (&mut low[..count], &mut high[..count]);
     let (lower, upper) = (lower.map(|l| &l[..count]), upper.map(|u| &u[..count]));
-    let mut signs = 0;
+    let (mut signs, mut most) = (0, 0);
     for k in 0..count {
         let mut l = weights[0].at(k) * lower[0][k];
         let mut h = weights[0].at(k) * upper[0][k];
@@ -201,9 +214,13 @@ fn sums<const PAINTS: usize>(
             h += weights[m].at(k) * upper[m][k];
         }
         signs |= (h - l).to_bits();
+        if WATCH {
+            // Magnitudes compare like their bits.
+            most = most.max(l.to_bits() & MAGNITUDE).max(h.to_bits() & MAGNITUDE);
+        }
         (low[k], high[k]) = (l, h);
     }
-    signs >> 31 == 0
+    (signs >> 31 == 0, f32::from_bits(most))
 }
 
 #[cfg(test)]

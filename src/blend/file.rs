@@ -234,7 +234,7 @@ impl PaintHeader {
             diffuse: paint.diffuse,
             lobes: paint.lobes.clone(),
             chi_overall: paint.color_table.overall(),
-            origin: paint.origin,
+            origin: paint.origin.clone(),
             clustering: paint.clustering.clone(),
         }
     }

@@ -274,8 +274,14 @@ impl Blend {
     }
 
     /// What is known of each paint, in the order asked for.
-    pub fn origins(&self) -> impl Iterator<Item = Origin> + Clone {
-        self.asked.iter().map(|&place| self.paints[place].origin)
+    pub fn origins(&self) -> impl Iterator<Item = &Origin> + Clone {
+        self.asked.iter().map(|&place| &self.paints[place].origin)
+    }
+
+    /// Coat, diffuse albedo and lobes of each paint, in the order asked for.
+    pub fn bases(&self) -> impl Iterator<Item = (Option<Coat>, [f64; 3], &[Lobe])> + Clone {
+        let asked = self.asked.iter().map(|&place| &self.paints[place]);
+        asked.map(|paint| (paint.coat, paint.diffuse, &paint.lobes[..]))
     }
 
     /// Texel size, grain and lifetime of each paint's flakes, in the order asked for; nothing where no paint has flakes.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::paint::{Clamp, EnergyCertificate, FitResiduals};
+
 /// Clusters of a paint that had too many and was reduced before it was blended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reduction {
@@ -11,8 +13,8 @@ pub struct Reduction {
     pub to: usize,
 }
 
-/// Where one paint of a blend comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Where one paint of a blend comes from, and what was known of it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
     /// Whether its flakes were simulated instead of measured.
     #[serde(default)]
@@ -20,6 +22,18 @@ pub struct Origin {
     /// How its clusters were reduced, where they were.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reduced: Option<Reduction>,
+    /// How well its base was fitted, where it was fitted to a table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residuals: Option<FitResiduals>,
+    /// How much of the light that falls on it it gives back.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub energy: Option<EnergyCertificate>,
+    /// What had to be clamped, where it is itself a realisation.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub clamps: Vec<Clamp>,
+    /// What its user should know.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 impl Origin {

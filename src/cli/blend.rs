@@ -12,7 +12,7 @@ use super::profile::TargetArgs;
 use super::progress::Progress;
 use crate::accuracy::blend_error;
 use crate::blend::PAINTS;
-use crate::workshop::{Work, WorkshopError, blend_paints, describe_blend, open_paint};
+use crate::workshop::{Work, WorkshopError, blend_paints, describe_blend, open_paints};
 
 /// Find how the flakes of 2 to 5 paints become one another, and keep it as a .blend.
 ///
@@ -53,11 +53,9 @@ impl Blend {
             options.profile = *picked.profile();
         }
         let mut stages = Stages::begin();
-        let mut paints = Vec::with_capacity(self.inputs.len());
-        for input in &self.inputs {
-            let progress = Progress::reading(input);
-            paints.push(open_paint(input, &options, &|share| progress.at(share))?);
-        }
+        let progress = Progress::reading(&self.inputs.join(", "));
+        let paints = open_paints(&self.inputs, &options, &|share| progress.at(share))?;
+        drop(progress);
         stages.end("ingest");
         let progress = Progress::new("blending");
         let made = blend_paints(

@@ -6,6 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::ingest::ReadingArgs;
+use super::made;
 use super::output;
 use super::profile::ProfileArgs;
 use super::progress::Progress;
@@ -53,8 +54,9 @@ impl Evaluate {
             &pairs,
             &options.limits,
         )?;
+        let mut clamps = Vec::new();
         let values = if self.raw {
-            self.weights.refuse()?;
+            self.weights.refuse_raw()?;
             let Source::Path(path) = find(&self.input)? else {
                 return Err(WorkshopError::input(
                     &self.input,
@@ -73,6 +75,7 @@ impl Evaluate {
             drop(progress);
             let weights = self.weights.for_thing(&thing)?;
             let realised = thing.realise(weights.as_ref())?;
+            clamps = realised.clamps;
             evaluate(&realised.paint, &pairs, chi)
         };
         let mut bytes = serde_json::to_vec(&values).map_err(WorkshopError::internal)?;
@@ -80,9 +83,10 @@ impl Evaluate {
         output::replace(&self.out, &bytes)?;
         if json {
             return output::print_json(
-                &json!({ "out": self.out.display().to_string(), "pairs": pairs.pairs.len() }),
+                &json!({ "out": self.out.display().to_string(), "pairs": pairs.pairs.len(), "clamps": clamps }),
             );
         }
+        made::clamped(&clamps);
         eprintln!("{}: {} pairs", self.out.display(), pairs.pairs.len());
         Ok(())
     }

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Map, json};
 
 use super::output;
+use crate::paint::Clamp;
 use crate::workshop::{Made, Picked, WorkshopError};
 
 /// The seconds of a command's stages.
@@ -62,6 +63,13 @@ pub fn tell(
     notes(picked, &made.notes);
     eprintln!("{}: {size}", out.display());
     Ok(())
+}
+
+/// What was clamped in a realisation.
+pub fn clamped(clamps: &[Clamp]) {
+    for clamp in clamps {
+        eprintln!("note: {clamp}");
+    }
 }
 
 /// What was picked for a target, and what the user should know.

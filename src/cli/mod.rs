@@ -95,7 +95,25 @@ pub fn run() -> ExitCode {
     }
 }
 
+/// Refuses a number of threads in the environment that is none; rayon would pass over it.
+fn check_threads_of_environment() -> Result<(), WorkshopError> {
+    let Some(said) = std::env::var_os("RAYON_NUM_THREADS") else {
+        return Ok(());
+    };
+    let text = said.to_string_lossy();
+    if text.is_empty() || text.trim().parse::<usize>().is_ok() {
+        return Ok(());
+    }
+    let problem = format!(
+        "RAYON_NUM_THREADS is {text:?}, accepted is a number of threads, or 0 for all cores"
+    );
+    Err(WorkshopError::usage("RAYON_NUM_THREADS", problem))
+}
+
 fn start(cli: Cli) -> Result<(), WorkshopError> {
+    if cli.common.threads.is_none() {
+        check_threads_of_environment()?;
+    }
     rayon::ThreadPoolBuilder::new()
         // 0 leaves it to rayon, which reads RAYON_NUM_THREADS, where 0 and nothing mean all.
         .num_threads(cli.common.threads.unwrap_or(0))

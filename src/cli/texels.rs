@@ -6,6 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::ingest::ReadingArgs;
+use super::made;
 use super::number::{real, whole};
 use super::output;
 use super::preview::Size;
@@ -64,9 +65,10 @@ impl Texels {
         output::replace(&self.out, &bytes)?;
         if json {
             return output::print_json(
-                &json!({ "out": self.out.display().to_string(), "bytes": bytes.len() }),
+                &json!({ "out": self.out.display().to_string(), "bytes": bytes.len(), "clamps": realised.clamps }),
             );
         }
+        made::clamped(&realised.clamps);
         eprintln!(
             "{}: {} x {} texels",
             self.out.display(),

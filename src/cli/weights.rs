@@ -80,6 +80,17 @@ impl WeightArgs {
         ))
     }
 
+    /// A measurement takes none either.
+    pub fn refuse_raw(&self) -> Result<(), WorkshopError> {
+        if self.is_empty() {
+            return Ok(());
+        }
+        Err(WorkshopError::usage(
+            "--weights",
+            "--raw evaluates a measurement, which takes no weights: leave either out",
+        ))
+    }
+
     /// The weights for a blend of the named paints.
     fn for_blend<'a>(
         &self,

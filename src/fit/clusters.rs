@@ -39,7 +39,7 @@ pub struct ClusterSettings {
     pub clusters: usize,
     /// Rule of the boxes.
     pub box_rule: BoxRule,
-    /// Of the measured angles every so many-th is fitted, on either grid, and the last; at least 1.
+    /// Of the measured angles every n-th is fitted, on either grid, and the last; at least 1.
     pub angle_step: usize,
 }
 

@@ -123,8 +123,10 @@ impl FlakeRecipe {
         } else {
             1
         };
+        // As instruments write them: paints that were measured at the same angles share them to the bit.
+        let written = |degrees: f64| (degrees * 1e4).round() / 1e4;
         let degrees = (0..angles)
-            .map(|k| self.largest_deg * f64::from(k) / f64::from(steps))
+            .map(|k| written(self.largest_deg * f64::from(k) / f64::from(steps)))
             .collect();
         // Multiples of a positive step up to at most 85°.
         AngleGrid::new(degrees).unwrap_or_else(|_| AngleGrid::single())

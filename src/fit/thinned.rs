@@ -3,7 +3,7 @@
 use crate::measurement::{FlakePictures, PackageError, SliceRoom};
 use crate::paint::AngleGrid;
 
-/// Every so many-th angle of some pictures, on either grid, and the last.
+/// Every n-th angle of some pictures, on either grid, and the last.
 pub struct Thinned<'a> {
     pictures: &'a dyn FlakePictures,
     rows: Vec<usize>,
@@ -19,7 +19,7 @@ impl<'a> Thinned<'a> {
         Self::by_steps(pictures, [step; 2])
     }
 
-    /// Every so many-th angle of θh and of θd.
+    /// Every n-th angle of θh and of θd.
     #[must_use]
     pub fn by_steps(pictures: &'a dyn FlakePictures, [step_h, step_d]: [usize; 2]) -> Self {
         let (rows, columns) = (

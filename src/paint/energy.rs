@@ -10,7 +10,7 @@
 //! `h = n` has `θd` of that column, and between columns the paint is a mixture of them. A measured paint may exceed 1 (uncalibrated tables do); the certificate says so, it changes
 //! nothing.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,13 @@ pub struct EnergyCertificate {
 }
 
 impl EnergyCertificate {
+    /// The largest albedo, where light would come from nowhere.
+    #[must_use]
+    pub fn excess(&self) -> Option<f64> {
+        let most = self.albedo.iter().copied().fold(0.0, f64::max);
+        (!self.conserves).then_some(most)
+    }
+
     /// What is wrong with a certificate that was read from a file.
     pub(super) fn check(&self) -> Result<(), &'static str> {
         let count = self.incidence_deg.len();
@@ -167,7 +174,8 @@ fn directional_albedo(reflectance: &Reflectance<'_>, theta_deg: f64, tangents: &
         .max(1e-4);
     let theta = theta_deg.to_radians();
     let wi = [-theta.sin(), 0.0, theta.cos()];
-    let (rings, spokes) = (192_u32, 96_u32);
+    // A paint reflects alike to both sides of the plane of incidence: the spokes of one side are looked at.
+    let (rings, spokes) = (192_u32, 48_u32);
     let mut sum = [0.0; 3];
     // tan θh = narrowest · sinh(t): even steps inside the narrowest lobe, growing steps outside.
     let reach = (200.0 / narrowest).asinh();
@@ -177,19 +185,18 @@ fn directional_albedo(reflectance: &Reflectance<'_>, theta_deg: f64, tangents: &
     edges.extend(tangents.iter().map(|tangent| (tangent / narrowest).asinh()));
     edges.sort_by(f64::total_cmp);
     edges.dedup_by(|above, kept| *above - *kept < LEAST_RING * step);
+    let directions: Vec<[f64; 2]> = (0..spokes)
+        .map(|spoke| (f64::from(spoke) + 0.5) / f64::from(spokes) * PI)
+        .map(|phi| [phi.cos(), phi.sin()])
+        .collect();
     for ring in edges.windows(2) {
         let (t, width) = (f64::midpoint(ring[0], ring[1]), ring[1] - ring[0]);
         let tangent = narrowest * t.sinh();
         let width = narrowest * t.cosh() * width;
         let cos_h = 1.0 / (1.0 + tangent * tangent).sqrt();
         let solid = tangent * width * cos_h.powi(3) * TAU / f64::from(spokes);
-        for spoke in 0..spokes {
-            let phi = (f64::from(spoke) + 0.5) / f64::from(spokes) * TAU;
-            let h = [
-                tangent * cos_h * phi.cos(),
-                tangent * cos_h * phi.sin(),
-                cos_h,
-            ];
+        for [cos_phi, sin_phi] in &directions {
+            let h = [tangent * cos_h * cos_phi, tangent * cos_h * sin_phi, cos_h];
             let h_i = h[0] * wi[0] + h[2] * wi[2];
             let wo: [f64; 3] = std::array::from_fn(|k| 2.0 * h_i * h[k] - wi[k]);
             if h_i <= 0.0 || wo[2] <= 0.0 {

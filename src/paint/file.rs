@@ -37,6 +37,14 @@ pub struct Provenance {
     pub notes: std::collections::BTreeMap<String, String>,
 }
 
+impl Provenance {
+    /// Whether the paint is a realisation of a blend.
+    #[must_use]
+    pub fn is_blend(&self) -> bool {
+        self.source == "blend"
+    }
+}
+
 /// How the flakes were clustered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -45,7 +53,7 @@ pub struct Clustering {
     pub clusters: usize,
     /// Rule that boxes follow: `tight` or `moments`.
     pub box_rule: String,
-    /// Of the measured angles every so many-th was fitted, on either grid.
+    /// Of the measured angles every n-th was fitted, on either grid.
     #[serde(default = "every_angle", skip_serializing_if = "is_every_angle")]
     pub angle_step: usize,
     /// Distance W1 in Lab between a slice's pixels and its clusters, bounded from above over all fitted slices: what

@@ -4,7 +4,7 @@ use super::WorkshopError;
 use crate::accuracy::{Profile, blend_deviation, left_out_w1};
 use crate::blend::{Blend, BlendError, Ingredient, Origin, Reduction};
 use crate::fit::{ClusterSettings, reduce_clusters};
-use crate::paint::{CarPaint, Clustering, Flakes, PaintFile};
+use crate::paint::{CarPaint, Clamp, Clustering, Flakes, PaintFile};
 use crate::transport::TransportError;
 
 /// A new blend and what was done on the way.
@@ -55,6 +55,10 @@ pub fn blend_paints(
         })?;
     let origins = paints.iter().zip(&reduced).map(|(file, reduced)| Origin {
         simulated_flakes: file.provenance.simulated_flakes,
+        residuals: file.residuals.clone(),
+        energy: Some(file.energy.clone()),
+        clamps: clamps_of(file).to_vec(),
+        warnings: file.warnings.clone(),
         reduced: reduced.as_ref().map(|fewer| Reduction {
             from: widest(&file.paint),
             to: widest(fewer),
@@ -74,6 +78,12 @@ pub fn blend_paints(
         let asked = blend.asked_at(place).and_then(|k| paints.get(k));
         asked.map_or("", |file| file.name.as_str())
     };
+    if report.smoothed_more > 0 {
+        notes.push(format!(
+            "{} of {} slices were smoothed more than epsilon says, to converge; the gap tells what that costs",
+            report.smoothed_more, report.slices
+        ));
+    }
     for &place in &report.mixed {
         notes.push(format!(
             "{}: its angles differ from the common grid of {} slices; slices in between are mixtures of their neighbours",
@@ -87,6 +97,11 @@ pub fn blend_paints(
         ));
     }
     Ok(Blended { blend, notes })
+}
+
+fn clamps_of(file: &PaintFile) -> &[Clamp] {
+    let realisation = file.provenance.realisation.as_ref();
+    realisation.map_or(&[], |of| &of.clamps)
 }
 
 fn widest(paint: &CarPaint) -> usize {
@@ -120,7 +135,7 @@ fn angle_step(file: &PaintFile, wanted: &ClusterSettings) -> usize {
 
 /// Whether a paint came from a blend, with more clusters than the profile has.
 fn wants_fewer(file: &PaintFile, flakes: &Flakes, wanted: &ClusterSettings) -> bool {
-    file.provenance.source == "blend" && flakes.widest_slice() > wanted.clusters
+    file.provenance.is_blend() && flakes.widest_slice() > wanted.clusters
 }
 
 /// The paint as the profile wants it: with fewer angles if it was fitted at more, and, if it came from a blend and has
@@ -135,7 +150,7 @@ fn reduced(
     let thinned = (step > 1).then(|| {
         let thinned = flakes.thinned(step);
         notes.push(format!(
-            "{}: {} of {} flake slices were used, those at each {step}. of its angles",
+            "{}: {} of {} flake slices were used, one angle in {step} on either grid",
             file.name,
             thinned.slices(),
             flakes.slices(),

@@ -22,7 +22,7 @@ pub fn bundle_blend(thing: &Thing, profile: &Profile) -> Result<Made, WorkshopEr
                 "{} is one paint, which has no weights to move: realise it to a .zip instead",
                 file.name
             );
-            Err(WorkshopError::usage("BLEND", problem))
+            Err(WorkshopError::usage("blend", problem))
         }
     }
 }

@@ -63,7 +63,7 @@ pub(super) fn describe_correspondence(blend: &Blend) -> Value {
     let reduced: Vec<Value> = blend
         .origins()
         .enumerate()
-        .filter_map(|(k, origin)| origin.reduced.map(|by| (k, by)))
+        .filter_map(|(k, origin)| origin.reduced.as_ref().map(|by| (k, by)))
         .map(|(k, by)| json!({ "place": k, "name": names[k], "from": by.from, "to": by.to }))
         .collect();
     let mut correspondence = json!(report);
@@ -88,7 +88,19 @@ pub fn describe_blend(blend: &Blend) -> Value {
     let paints: Vec<Value> = blend
         .ingredients()
         .zip(blend.origins())
-        .map(|((name, hash), origin)| json!({ "name": name, "hash": hash, "simulated_flakes": origin.simulated_flakes }))
+        .zip(blend.bases())
+        .map(|(((name, hash), origin), (coat, diffuse, lobes))| {
+            json!({
+                "name": name,
+                "hash": hash,
+                "simulated_flakes": origin.simulated_flakes,
+                "parameters": { "coat": coat, "diffuse": diffuse, "lobes": lobes },
+                "residuals": origin.residuals,
+                "energy": origin.energy,
+                "clamps": origin.clamps,
+                "warnings": origin.warnings,
+            })
+        })
         .collect();
     json!({
         "paints": paints,

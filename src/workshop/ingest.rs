@@ -73,13 +73,13 @@ impl IngestOptions {
 /// [`WorkshopError`] with both numbers, and what to do.
 pub fn check_clusters(name: &str, paint: &PaintFile, wanted: usize) -> Result<(), WorkshopError> {
     match &paint.clustering {
-        Some(had) if had.clusters != wanted && paint.provenance.source != "blend" => {
+        Some(had) if had.clusters != wanted && !paint.provenance.is_blend() => {
             let problem = format!(
                 "{name} was clustered with {} clusters a slice, {wanted} were asked for: ingest its measurement again \
-                 with --clusters {wanted}, or leave the option out",
+                 with --clusters {wanted}, or clusters={wanted} in a query, or leave it out",
                 had.clusters
             );
-            Err(WorkshopError::usage("--clusters", problem))
+            Err(WorkshopError::usage("clusters", problem))
         }
         _ => Ok(()),
     }
@@ -146,7 +146,9 @@ fn ingest_called(
             ingest_brdf(&bare, name, options, progress, ended)
         }
         Measurement::Readings(upload) => {
-            let named = options.name.clone().or_else(|| upload.file.name.clone());
+            let asked = options.name.clone().filter(|_| !upload.file.asked_by_id);
+            let named = asked.or_else(|| upload.file.name.clone());
+            let named = named.or_else(|| options.name.clone());
             let name = named.unwrap_or_else(|| as_name(&unnamed(None), upload.layout));
             ingest_readings(*upload, name, options, ended)
         }

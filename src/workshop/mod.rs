@@ -43,7 +43,7 @@ pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
 pub use selftest::{Check, selftest};
 pub use study::{StudyOptions, study};
 pub use target::{Picked, Target};
-pub use thing::{Source, Thing, find, open, open_paint, read};
+pub use thing::{Source, Thing, find, open, open_paint, open_paints, read};
 
 #[cfg(test)]
 mod tests;

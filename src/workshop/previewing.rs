@@ -107,7 +107,7 @@ impl PictureFormat {
             Some("exr") => Ok(Self::Exr),
             _ => {
                 let problem = format!("{} ends in neither .png nor .exr", path.display());
-                Err(WorkshopError::usage("--out", problem))
+                Err(WorkshopError::usage("out", problem))
             }
         }
     }

@@ -2,6 +2,9 @@
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use rayon::prelude::*;
 
 use super::ingest::{IngestOptions, ingest};
 use super::{WorkshopError, samples};
@@ -127,6 +130,30 @@ pub fn open_paint(
     }
 }
 
+/// Several of them side by side, in the order of their names; `progress` hears the share done of all.
+///
+/// # Errors
+///
+/// Those of [`open_paint`], for the first name that has one.
+pub fn open_paints(
+    names: &[String],
+    options: &IngestOptions,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Vec<PaintFile>, WorkshopError> {
+    let done: Vec<AtomicU32> = names.iter().map(|_| AtomicU32::new(0)).collect();
+    let opened: Vec<_> = (names, &done)
+        .into_par_iter()
+        .map(|(name, own)| {
+            open_paint(name, options, &|share| {
+                own.store((share * 1e6) as u32, Ordering::Relaxed);
+                let sum: u32 = done.iter().map(|own| own.load(Ordering::Relaxed)).sum();
+                progress(sum as f32 / 1e6 / names.len() as f32);
+            })
+        })
+        .collect();
+    opened.into_iter().collect()
+}
+
 /// Whatever the name means; measurements are ingested.
 ///
 /// # Errors
@@ -153,9 +180,9 @@ pub fn open(
         if let Some(clusters) = options.clusters {
             let problem = format!(
                 "{name} is a blend, its clusters correspond already: blend its paints again with --clusters {clusters}, \
-                 or leave the option out"
+                 or leave it out"
             );
-            return Err(WorkshopError::usage("--clusters", problem));
+            return Err(WorkshopError::usage("clusters", problem));
         }
         return Ok(Thing::Blend(Box::new(blend)));
     }

@@ -13,18 +13,22 @@ pub fn blend_page(blend: &Blend) -> String {
     let report = blend.report();
     page.line("blend", names.join(", "));
     page.line("weights", format!("{} numbers, in this order", names.len()));
-    for (k, ((name, hash), origin)) in blend.ingredients().zip(blend.origins()).enumerate() {
+    let paints = blend.ingredients().zip(blend.origins()).zip(blend.bases());
+    for (k, (((name, hash), origin), (coat, diffuse, lobes))) in paints.enumerate() {
         let simulated = if origin.simulated_flakes {
             ", flakes simulated"
         } else {
             ""
         };
-        let reduced = origin.reduced.map_or(String::new(), |by| {
+        let reduced = origin.reduced.as_ref().map_or(String::new(), |by| {
             format!(", reduced from {} to {} clusters a slice", by.from, by.to)
         });
-        let word = if k == 0 { "paints" } else { "" };
-        page.line(word, format!("{name}{simulated}{reduced}"));
+        page.line(
+            &format!("paint {}", k + 1),
+            format!("{name}{simulated}{reduced}"),
+        );
         page.line("", format!("content {hash}"));
+        page.base(coat, &diffuse, lobes);
         if let Some(texture) = blend.textures().nth(k) {
             page.line(
                 "",
@@ -37,6 +41,14 @@ pub fn blend_page(blend: &Blend) -> String {
                 ),
             );
         }
+        if let Some(fit) = &origin.residuals {
+            page.fit(fit);
+        }
+        if let Some(energy) = &origin.energy {
+            page.energy(energy);
+        }
+        page.list("clamped", &origin.clamps);
+        page.list("warnings", &origin.warnings);
     }
     match &blend.flakes {
         None => page.line("flakes", "none"),

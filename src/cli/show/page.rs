@@ -3,7 +3,7 @@
 use std::fmt::{Display, Write as _};
 
 use crate::accuracy::ResultError;
-use crate::paint::AngleGrid;
+use crate::paint::{AngleGrid, Coat, EnergyCertificate, FitResiduals, Lobe, LuminanceError};
 
 /// Lines of a page: a word on the left, what it is on the right.
 #[derive(Default)]
@@ -21,6 +21,86 @@ impl Page {
         }
     }
 
+    /// Coat, diffuse albedo and lobes of a paint.
+    pub fn base(&mut self, coat: Option<Coat>, diffuse: &[f64; 3], lobes: &[Lobe]) {
+        self.line(
+            "coat",
+            coat.map_or("none".to_owned(), |coat| {
+                let finish = if coat.is_mirror() { ", a mirror" } else { "" };
+                format!(
+                    "ior {:.4}, roughness {:.4}{finish}",
+                    coat.ior, coat.roughness
+                )
+            }),
+        );
+        self.line("diffuse", format!("albedo {}", short(diffuse)));
+        let lobe = |lobe: &Lobe| {
+            let (alpha, f0) = (lobe.alpha, lobe.f0);
+            format!(
+                "alpha {alpha:.4}   F0 {f0:.3}   weight {}",
+                short(&lobe.weight)
+            )
+        };
+        let lobes: Vec<String> = lobes.iter().map(lobe).collect();
+        self.list("lobes", &lobes);
+    }
+
+    /// How well a base was fitted to a measured table.
+    pub fn fit(&mut self, fit: &FitResiduals) {
+        let luminance = |what: &str, of: &LuminanceError| {
+            format!(
+                "{what}: median {:.1} %, 90th percentile {:.1} % (floor {:.1} % and {:.1} %)",
+                100.0 * of.median,
+                100.0 * of.p90,
+                100.0 * of.floor_median,
+                100.0 * of.floor_p90
+            )
+        };
+        let mut rows = vec![
+            luminance("luminance", &fit.all),
+            luminance("within 5° of the mirror", &fit.near_mirror),
+        ];
+        rows.extend(fit.instrument.iter().map(|at| {
+            format!(
+                "{:>6}°   ΔE2000 {:.2} (floor {:.2})",
+                at.aspecular_deg, at.fit, at.floor
+            )
+        }));
+        rows.push(format!(
+            "{:.2} % of the entries invalid",
+            100.0 * fit.invalid_share
+        ));
+        self.table(
+            "fit",
+            "the floor is what a free function of θh and θd reaches on this measurement",
+            rows,
+        );
+    }
+
+    /// How much of the light that falls on a paint it gives back.
+    pub fn energy(&mut self, energy: &EnergyCertificate) {
+        let albedo = energy.incidence_deg.iter().zip(&energy.albedo);
+        let albedo: Vec<String> = albedo
+            .map(|(angle, albedo)| format!("{angle:.4}°: {albedo:.3}").replace(".0000°", "°"))
+            .collect();
+        self.table(
+            "energy",
+            if energy.conserves {
+                "gives back no more light than it gets"
+            } else {
+                "gives back more light than it gets: the measurement may be uncalibrated"
+            },
+            [albedo.join("   ")],
+        );
+    }
+
+    /// Several lines under one word.
+    pub fn list(&mut self, word: &str, texts: &[impl Display]) {
+        for (k, text) in texts.iter().enumerate() {
+            self.line(if k == 0 { word } else { "" }, text);
+        }
+    }
+
     /// How far a result is from the reference, term by term.
     pub fn error(&mut self, error: &ResultError) {
         for term in &error.terms {
@@ -34,6 +114,10 @@ impl Page {
     pub fn text(self) -> String {
         self.0
     }
+}
+
+fn short(values: &[f64; 3]) -> String {
+    values.map(|v| format!("{v:.4}")).join(" ")
 }
 
 /// How many angles, and from where to where.

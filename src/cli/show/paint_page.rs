@@ -2,7 +2,7 @@
 
 use super::page::{Page, range};
 use crate::accuracy::{paint_error, sparkle};
-use crate::paint::{AngleGrid, Flakes, LuminanceError, PaintFile};
+use crate::paint::{AngleGrid, Flakes, PaintFile};
 use crate::workshop::readings;
 
 /// The page of a paint.
@@ -32,28 +32,7 @@ pub fn paint_page(file: &PaintFile) -> String {
         );
     }
     page.line("content", paint.content_hash().to_hex());
-    page.line(
-        "coat",
-        paint.coat.map_or("none".to_owned(), |coat| {
-            let finish = if coat.is_mirror() { ", a mirror" } else { "" };
-            format!(
-                "ior {:.4}, roughness {:.4}{finish}",
-                coat.ior, coat.roughness
-            )
-        }),
-    );
-    page.line("diffuse", format!("albedo {}", short(&paint.diffuse)));
-    let lobe = |k: usize| {
-        let lobe = &paint.lobes[k];
-        let (alpha, f0) = (lobe.alpha, lobe.f0);
-        format!(
-            "alpha {alpha:.4}   F0 {f0:.3}   weight {}",
-            short(&lobe.weight)
-        )
-    };
-    for k in 0..paint.lobes.len() {
-        page.line(if k == 0 { "lobes" } else { "" }, lobe(k));
-    }
+    page.base(paint.coat, &paint.diffuse, &paint.lobes);
     let table = &paint.color_table;
     page.line(
         "color table",
@@ -76,37 +55,26 @@ pub fn paint_page(file: &PaintFile) -> String {
         Some(flakes) => of_flakes(&mut page, file, flakes),
         None => page.line("flakes", "none"),
     }
-    of_fit(&mut page, file);
-    let albedo = file.energy.incidence_deg.iter().zip(&file.energy.albedo);
-    page.table(
-        "energy",
-        if file.energy.conserves {
-            "gives back no more light than it gets"
-        } else {
-            "gives back more light than it gets: the measurement may be uncalibrated"
-        },
-        [albedo
-            .map(|(angle, albedo)| format!("{angle:.4}°: {albedo:.3}").replace(".0000°", "°"))
-            .collect::<Vec<_>>()
-            .join("   ")],
+    match &file.residuals {
+        Some(fit) => page.fit(fit),
+        None if from.is_blend() => page.line("fit", "none: it is a realisation of a blend"),
+        None => page.line(
+            "fit",
+            "none of a table: the base came as a model, or was fitted to readings",
+        ),
+    }
+    page.energy(&file.energy);
+    page.list(
+        "clamped",
+        from.realisation.as_ref().map_or(&[][..], |of| &of.clamps),
     );
-    let clamps = from.realisation.as_ref().map_or(&[][..], |of| &of.clamps);
-    for (k, clamp) in clamps.iter().enumerate() {
-        page.line(if k == 0 { "clamped" } else { "" }, clamp);
-    }
-    for (k, warning) in file.warnings.iter().enumerate() {
-        page.line(if k == 0 { "warnings" } else { "" }, warning);
-    }
+    page.list("warnings", &file.warnings);
     page.text()
 }
 
 fn list(values: &[f64]) -> String {
     let texts: Vec<String> = values.iter().map(f64::to_string).collect();
     texts.join(",")
-}
-
-fn short(values: &[f64; 3]) -> String {
-    values.map(|v| format!("{v:.4}")).join(" ")
 }
 
 /// What the instrument that came with the measurement says of the same angle.
@@ -170,42 +138,4 @@ fn of_flakes(page: &mut Page, file: &PaintFile, flakes: &Flakes) {
         rows,
     );
     page.error(&paint_error(file));
-}
-
-fn of_fit(page: &mut Page, file: &PaintFile) {
-    let Some(fit) = &file.residuals else {
-        page.line(
-            "fit",
-            "none of a table: the base came as a model, or was fitted to readings",
-        );
-        return;
-    };
-    let luminance = |what: &str, of: &LuminanceError| {
-        format!(
-            "{what}: median {:.1} %, 90th percentile {:.1} % (floor {:.1} % and {:.1} %)",
-            100.0 * of.median,
-            100.0 * of.p90,
-            100.0 * of.floor_median,
-            100.0 * of.floor_p90
-        )
-    };
-    let mut rows = vec![
-        luminance("luminance", &fit.all),
-        luminance("within 5° of the mirror", &fit.near_mirror),
-    ];
-    rows.extend(fit.instrument.iter().map(|at| {
-        format!(
-            "{:>6}°   ΔE2000 {:.2} (floor {:.2})",
-            at.aspecular_deg, at.fit, at.floor
-        )
-    }));
-    rows.push(format!(
-        "{:.2} % of the entries invalid",
-        100.0 * fit.invalid_share
-    ));
-    page.table(
-        "fit",
-        "the floor is what a free function of θh and θd reaches on this measurement",
-        rows,
-    );
 }

@@ -276,7 +276,7 @@ impl Clusterer {
         for (number, place) in (0..runs).step_by(LANES / RUN).zip(0_u64..) {
             for part in 0..LANES / RUN {
                 let run = (number + part).min(runs - 1);
-                // Not every so many-th: the picture's width may be a multiple of that.
+                // Not every n-th: the picture's width may be a multiple of that.
                 let shift = (place * 4 + part as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
                 let from = run * stretch + shift as usize % (stretch - RUN);
                 for (together, plane) in together.iter_mut().zip(planes) {

@@ -217,8 +217,7 @@ pub(in crate::workshop) fn finish(
     mut warnings: Vec<String>,
 ) -> PaintFile {
     let energy = certify(&paint);
-    if !energy.conserves {
-        let most = energy.albedo.iter().copied().fold(0.0, f64::max);
+    if let Some(most) = energy.excess() {
         warnings.push(format!(
             "the paint reflects up to {most:.2} times the light it gets: the measurement may be uncalibrated, or what was \
              not measured be guessed too bright"

@@ -41,7 +41,7 @@ pub struct ReadingsUpload {
     pub hash: blake3::Hash,
 }
 
-/// Refuses what only an MPI 2005 table leaves open, said of anything else.
+/// Refuses what only an MPI 2005 table leaves open, said of anything else; a package's manifest says what its table is.
 fn check_mpi_only(layout: Layout, said: &ReadOptions) -> Result<(), WorkshopError> {
     let given = [
         ("theta_h", said.theta_h.is_some()),
