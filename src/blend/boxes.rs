@@ -216,7 +216,9 @@ fn sums<const PAINTS: usize, const WATCH: bool>(
         signs |= (h - l).to_bits();
         if WATCH {
             // Magnitudes compare like their bits.
-            most = most.max(l.to_bits() & MAGNITUDE).max(h.to_bits() & MAGNITUDE);
+            most = most
+                .max(l.to_bits() & MAGNITUDE)
+                .max(h.to_bits() & MAGNITUDE);
         }
         (low[k], high[k]) = (l, h);
     }
