@@ -74,15 +74,7 @@ fn even(
     angles: Option<(AngleGrid, AngleGrid)>,
 ) -> Result<Option<CarPaint>, BlendError> {
     let blend = Blend::on(ingredients, settings, angles, &|_| ())?;
-    #[allow(clippy::cast_precision_loss)] // at most five
-    let weights = vec![1.0 / ingredients.len() as f64; ingredients.len()];
-    let weights = RealisationWeights {
-        weights,
-        base: None,
-        flake_lightness: None,
-        flake_color: None,
-        flake_saturation: 1.0,
-    };
+    let weights = RealisationWeights::equal(ingredients.len());
     Ok(blend.realise(&weights).ok().map(|realised| realised.paint))
 }
 

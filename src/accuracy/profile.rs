@@ -102,19 +102,6 @@ impl Profile {
         let same = |name: &&&str| Self::named(name).is_ok_and(|preset| preset == *self);
         PRESETS.iter().find(same).copied().unwrap_or("custom")
     }
-
-    /// The same profile with another number of clusters per slice.
-    ///
-    /// # Errors
-    ///
-    /// [`ProfileError::Range`] outside 1 to 4096.
-    pub fn with_clusters(self, clusters: usize) -> Result<Self, ProfileError> {
-        Knobs {
-            clusters: Some(u32::try_from(clusters).unwrap_or(u32::MAX)),
-            ..Knobs::default()
-        }
-        .turned(self)
-    }
 }
 
 impl std::str::FromStr for Profile {
@@ -149,11 +136,8 @@ mod tests {
         for name in PRESETS {
             let preset = Profile::named(name).expect("a preset");
             assert_eq!(preset.name(), name);
-            assert_eq!(
-                preset.with_clusters(51).expect("in range").name(),
-                "custom",
-                "{name}"
-            );
+            let turned: Profile = format!("{name},clusters=51").parse().expect("knobs");
+            assert_eq!(turned.name(), "custom", "{name}");
         }
         let spelled: Profile = "draft,clusters=50,angle_step=1,samples_per_pixel=64"
             .parse()

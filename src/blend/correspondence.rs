@@ -83,7 +83,7 @@ pub(super) struct SliceBlend {
 
 /// Memory of one thread.
 #[derive(Default)]
-pub(super) struct Bench {
+pub(super) struct Scratch {
     pub problem: Problem,
     pub workspace: Workspace,
     pub plan: Plan,
@@ -237,8 +237,8 @@ fn join_in_order(
 ) -> Result<Vec<SliceBlend>, BlendError> {
     let slices: Vec<_> = (0..grid.slices())
         .into_par_iter()
-        .map_init(Bench::default, |bench, k| {
-            let slice = blend_slice(paints, order, grid.angles(k), settings, bench);
+        .map_init(Scratch::default, |scratch, k| {
+            let slice = blend_slice(paints, order, grid.angles(k), settings, scratch);
             tell();
             slice.map_err(|source| grid.refused(k, source))
         })
@@ -277,15 +277,21 @@ fn blend_slice(
     order: &[usize],
     (theta_h_deg, theta_d_deg): (f64, f64),
     settings: &BlendSettings,
-    bench: &mut Bench,
+    scratch: &mut Scratch,
 ) -> Result<SliceBlend, TransportError> {
     let clusters_of = |place: usize, out: &mut Vec<Cluster>| {
         clusters_at(paints[place].flakes.as_ref(), theta_h_deg, theta_d_deg, out);
     };
-    clusters_of(order[0], &mut bench.clusters);
+    clusters_of(order[0], &mut scratch.clusters);
     let mut slice = SliceBlend {
-        probability: bench.clusters.iter().map(|c| c.probability).collect(),
-        boxes: vec![bench.clusters.iter().map(|c| (c.lower, c.upper)).collect()],
+        probability: scratch.clusters.iter().map(|c| c.probability).collect(),
+        boxes: vec![
+            scratch
+                .clusters
+                .iter()
+                .map(|c| (c.lower, c.upper))
+                .collect(),
+        ],
         cost: 0.0,
         gap: 0.0,
         smoothed_more: false,
@@ -298,13 +304,13 @@ fn blend_slice(
             slice.boxes.push(boxes);
             continue;
         }
-        clusters_of(place, &mut bench.clusters);
+        clusters_of(place, &mut scratch.clusters);
         let source =
             (0..slice.probability.len()).map(|k| (slice.even_center(k), slice.probability[k]));
-        let target = bench.clusters.iter().map(|c| (c.center(), c.probability));
-        bench.problem.refill(source, target)?;
-        slice.smoothed_more |= solve_somehow(settings, bench)?;
-        slice.join(&bench.plan, &bench.clusters);
+        let target = scratch.clusters.iter().map(|c| (c.center(), c.probability));
+        scratch.problem.refill(source, target)?;
+        slice.smoothed_more |= solve_somehow(settings, scratch)?;
+        slice.join(&scratch.plan, &scratch.clusters);
     }
     slice.sort_by_lightness();
     slice.put_back(order);
@@ -316,14 +322,14 @@ const SMOOTHER: f64 = 4.0;
 
 /// Solves the problem at hand; says whether it had to be smoothed more than asked. How far that is from the optimum the
 /// plan's gap tells.
-fn solve_somehow(settings: &BlendSettings, bench: &mut Bench) -> Result<bool, TransportError> {
+fn solve_somehow(settings: &BlendSettings, scratch: &mut Scratch) -> Result<bool, TransportError> {
     let mut method = settings.method;
     loop {
         let solved = method.solve_into(
-            &bench.problem,
+            &scratch.problem,
             settings.cost,
-            &mut bench.workspace,
-            &mut bench.plan,
+            &mut scratch.workspace,
+            &mut scratch.plan,
         );
         match (solved, &mut method) {
             (Err(TransportError::NotConverged { .. }), Method::Sinkhorn { epsilon })

@@ -12,7 +12,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::correspondence::{Bench, BlendSettings, Grid, SliceBlend};
+use super::correspondence::{BlendSettings, Grid, Scratch, SliceBlend};
 use super::mixture::clusters_at;
 use super::{BlendError, correspondence};
 use crate::paint::CarPaint;
@@ -62,8 +62,8 @@ pub(super) fn pair_reports(
                 (0..count)
                     .into_par_iter()
                     .step_by(step)
-                    .map_init(Bench::default, |bench, k| {
-                        bound_alone([paints[i], paints[j]], grid.angles(k), bench)
+                    .map_init(Scratch::default, |scratch, k| {
+                        bound_alone([paints[i], paints[j]], grid.angles(k), scratch)
                             .map(|bound| (costs[k] - bound).max(0.0))
                             .map_err(|source| grid.refused(k, source))
                     })
@@ -87,7 +87,7 @@ pub(super) fn pair_reports(
 fn bound_alone(
     pair: [&CarPaint; 2],
     (theta_h_deg, theta_d_deg): (f64, f64),
-    bench: &mut Bench,
+    scratch: &mut Scratch,
 ) -> Result<f64, crate::transport::TransportError> {
     let mut clouds = [Vec::new(), Vec::new()];
     for (paint, cloud) in pair.iter().zip(&mut clouds) {
@@ -95,19 +95,19 @@ fn bound_alone(
             paint.flakes.as_ref(),
             theta_h_deg,
             theta_d_deg,
-            &mut bench.clusters,
+            &mut scratch.clusters,
         );
-        cloud.extend(bench.clusters.iter().map(|c| (c.center(), c.probability)));
+        cloud.extend(scratch.clusters.iter().map(|c| (c.center(), c.probability)));
     }
     let [source, target] = clouds;
-    bench.problem.refill(source, target)?;
+    scratch.problem.refill(source, target)?;
     Method::Exact.solve_into(
-        &bench.problem,
+        &scratch.problem,
         Cost::Distance,
-        &mut bench.workspace,
-        &mut bench.plan,
+        &mut scratch.workspace,
+        &mut scratch.plan,
     )?;
-    Ok(bench.plan.cost - bench.plan.gap)
+    Ok(scratch.plan.cost - scratch.plan.gap)
 }
 
 impl correspondence::SliceBlend {

@@ -96,7 +96,7 @@ fn blend(paints: &[&CarPaint]) -> Blend {
 
 fn at(blend: &Blend, weights: &[f64]) -> CarPaint {
     let realised = blend
-        .realise(&RealisationWeights::even(weights.to_vec()))
+        .realise(&RealisationWeights::uniform(weights.to_vec()))
         .expect("weights fit");
     realised
         .paint
@@ -280,7 +280,7 @@ fn a_realisation_over_an_old_one_is_that_of_new_memory() {
     let mut solid = paint(11, H, D);
     solid.flakes = None;
     let other = blend(&[&paint(10, &[0.0], D), &solid]);
-    let weights = |w: f64| RealisationWeights::even(vec![w, 1.0 - w]);
+    let weights = |w: f64| RealisationWeights::uniform(vec![w, 1.0 - w]);
     let mut old = other.realise(&weights(0.3)).expect("realised");
     for w in [0.5, 1.0, 1.4, -0.7, 9.0, 0.0] {
         old = pair.realise_over(&weights(w), old).expect("realised");
@@ -341,7 +341,7 @@ fn flakes_fade_into_a_solid_color() {
 fn each_part_follows_its_own_weights() {
     let (a, b) = (paint(13, H, D), paint(14, H, D));
     let blend = blend(&[&a, &b]);
-    let mut weights = RealisationWeights::even(vec![1.0, 0.0]);
+    let mut weights = RealisationWeights::uniform(vec![1.0, 0.0]);
     weights.flake_lightness = Some(vec![0.0, 1.0]);
     weights.flake_saturation = 0.0;
     let mixed = blend.realise(&weights).expect("fits").paint;
@@ -373,7 +373,7 @@ fn far_weights_stay_valid_and_say_what_was_held() {
         [-3.0, 4.0],
     ] {
         let realised = blend
-            .realise(&RealisationWeights::even(far.to_vec()))
+            .realise(&RealisationWeights::uniform(far.to_vec()))
             .expect("finite weights");
         realised.paint.validate(&Limits::default()).expect("valid");
         let reflectance = Reflectance::new(&realised.paint);
@@ -384,7 +384,7 @@ fn far_weights_stay_valid_and_say_what_was_held() {
         );
     }
     let clamps = blend
-        .realise(&RealisationWeights::even(vec![-3.0, 4.0]))
+        .realise(&RealisationWeights::uniform(vec![-3.0, 4.0]))
         .expect("finite")
         .clamps;
     assert!(
@@ -399,9 +399,9 @@ fn far_weights_stay_valid_and_say_what_was_held() {
 fn weights_that_are_none_are_refused_by_field_and_value() {
     let blend = blend(&[&paint(19, H, D), &paint(20, H, D)]);
     let error = |w: RealisationWeights| blend.realise(&w).expect_err("refused").to_string();
-    assert!(error(RealisationWeights::even(vec![1.0])).contains("needs 2: first, second"));
-    assert!(error(RealisationWeights::even(vec![f64::NAN, 1.0])).contains("weights[0] is NaN"));
-    let mut weights = RealisationWeights::even(vec![1.0, 0.0]);
+    assert!(error(RealisationWeights::uniform(vec![1.0])).contains("needs 2: first, second"));
+    assert!(error(RealisationWeights::uniform(vec![f64::NAN, 1.0])).contains("weights[0] is NaN"));
+    let mut weights = RealisationWeights::uniform(vec![1.0, 0.0]);
     weights.base = Some(vec![0.0, f64::INFINITY]);
     assert!(error(weights).contains("base[1] is inf"));
 }

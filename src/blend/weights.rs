@@ -66,9 +66,9 @@ pub enum WeightError {
 }
 
 impl RealisationWeights {
-    /// The same weights for everything.
+    /// The same list of weights for base, lightness and color.
     #[must_use]
-    pub fn even(weights: Vec<f64>) -> Self {
+    pub fn uniform(weights: Vec<f64>) -> Self {
         Self {
             weights,
             base: None,
@@ -76,6 +76,13 @@ impl RealisationWeights {
             flake_color: None,
             flake_saturation: 1.0,
         }
+    }
+
+    /// So many paints in equal parts.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)] // a few paints
+    pub fn equal(paints: usize) -> Self {
+        Self::uniform(vec![1.0 / paints as f64; paints])
     }
 
     /// Weights of the base.

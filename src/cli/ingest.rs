@@ -12,7 +12,9 @@ use super::profile::{ProfileArgs, TargetArgs};
 use super::progress::Progress;
 use super::{output, show};
 use crate::measurement::{Layout, ReadOptions, ThetaHSpacing};
-use crate::workshop::{IngestOptions, Source, Work, WorkshopError, find, ingest_in_stages};
+use crate::workshop::{
+    IngestOptions, Source, Work, WorkshopError, describe_paint, find, ingest_in_stages,
+};
 
 const A_CSV: &str = "\
 A CSV of readings:
@@ -164,7 +166,7 @@ impl Ingest {
         stages.borrow().write(self.timings.as_deref())?;
         if json {
             return output::print_json(
-                &json!({ "out": self.out.display().to_string(), "profile": options.profile.name(), "picked": picked, "paint": show::summary(&paint) }),
+                &json!({ "out": self.out.display().to_string(), "profile": options.profile.name(), "picked": picked, "paint": describe_paint(&paint) }),
             );
         }
         made::notes(picked.as_ref(), &[]);

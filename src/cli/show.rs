@@ -5,7 +5,6 @@ mod page;
 mod paint_page;
 
 use clap::Args;
-use serde_json::Value;
 
 use super::ingest::ReadingArgs;
 use super::output;
@@ -40,11 +39,6 @@ impl Show {
         };
         output::print(&text)
     }
-}
-
-/// What `ingest --json` tells of the new paint.
-pub fn summary(paint: &PaintFile) -> Value {
-    describe_paint(paint)
 }
 
 /// One line for people.

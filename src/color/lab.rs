@@ -12,9 +12,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::rgb::{LinearRgb, rgb_to_xyz, xyz_to_rgb};
-use super::white::{D65_2, Illuminant, Observer, WhitePoint};
+use super::white::{D65_2, WhitePoint};
 
-/// CIELAB relative to the perfect diffuser, D65 and 2° observer unless it stands in a [`ReadingLab`].
+/// CIELAB relative to the perfect diffuser, D65 and 2° observer unless it comes with another white point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Lab {
     /// Lightness, 0 black, 100 the perfect diffuser.
@@ -23,17 +23,6 @@ pub struct Lab {
     pub a: f64,
     /// Blue (−) to yellow (+).
     pub b: f64,
-}
-
-/// A Lab value with the light and the observer it was read under.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ReadingLab {
-    /// The three numbers.
-    pub lab: Lab,
-    /// Light of the reading.
-    pub illuminant: Illuminant,
-    /// Observer of the reading.
-    pub observer: Observer,
 }
 
 /// Knee of the cube root, on the `f` axis.

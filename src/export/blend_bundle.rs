@@ -37,10 +37,8 @@ pub fn blend_bundle(
 
 /// The paint in the middle: what it shares with every other realisation is written from it.
 fn at_equal_weights(blend: &Blend) -> CarPaint {
-    #[allow(clippy::cast_precision_loss)] // at most five paints
-    let weights = vec![1.0 / blend.len() as f64; blend.len()];
     blend
-        .realise(&RealisationWeights::even(weights))
+        .realise(&RealisationWeights::equal(blend.len()))
         .expect("one finite weight a paint")
         .paint
 }

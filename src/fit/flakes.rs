@@ -14,7 +14,7 @@ use super::lifetime::{Lifetime, comonotone, correlation, lifetime};
 use super::thinned::Thinned;
 use crate::color::luminance;
 use crate::measurement::{FlakePictures, PackageError, SliceRoom};
-use crate::paint::{Clustering, FlakeTexture, Flakes, Percentiles, SharedList};
+use crate::paint::{Clustering, FlakeTexture, Flakes, Percentiles};
 
 /// Most texels of a slice that grain and lifetime look at: whole rows from the top.
 const PROBED_TEXELS: usize = 1 << 18;
@@ -162,22 +162,10 @@ fn luminance_of(planes: [&[f32]; 3], width: usize) -> Luminance {
 }
 
 fn gather(pictures: &dyn FlakePictures, fitted: &[FittedSlice], texture: FlakeTexture) -> Flakes {
-    let mut flakes = Flakes {
-        theta_h: pictures.theta_h().clone(),
-        theta_d: pictures.theta_d().clone(),
-        offsets: vec![0].into(),
-        probability: SharedList::default(),
-        lower: Vec::new(),
-        upper: Vec::new(),
-        texture,
-    };
-    for slice in fitted {
-        flakes
-            .probability
-            .extend_from_slice(&slice.clusters.probability);
-        flakes.lower.extend_from_slice(&slice.clusters.lower);
-        flakes.upper.extend_from_slice(&slice.clusters.upper);
-        flakes.offsets.push(flakes.probability.len() as u32);
+    let grids = [pictures.theta_h().clone(), pictures.theta_d().clone()];
+    let mut flakes = Flakes::without_slices(grids, texture);
+    for FittedSlice { clusters, .. } in fitted {
+        flakes.push_slice(&clusters.probability, &clusters.lower, &clusters.upper);
     }
     flakes
 }

@@ -8,14 +8,14 @@ use rayon::prelude::*;
 
 use super::boxes::of_moments;
 use crate::color::LinearRgb;
-use crate::paint::{Flakes, SharedList, Slice, mean_color};
+use crate::paint::{Flakes, Slice, mean_color};
 
 /// Probability and corners of a finished cluster.
 type Boxed = (f64, [f32; 3], [f32; 3]);
 
 /// A cluster on its way: mass, moments in Lab, mean in linear light.
 #[derive(Clone, Copy, Debug)]
-struct Heap {
+struct Merged {
     mass: f64,
     center: [f64; 3],
     variance: [f64; 3],
@@ -31,38 +31,27 @@ pub fn reduce_clusters(flakes: &Flakes, most: usize) -> Flakes {
         .into_par_iter()
         .map(|k| reduce_slice(&flakes.slice_at(k), most.max(1)))
         .collect();
-    let mut reduced = Flakes {
-        theta_h: flakes.theta_h.clone(),
-        theta_d: flakes.theta_d.clone(),
-        offsets: vec![0].into(),
-        probability: SharedList::default(),
-        lower: Vec::new(),
-        upper: Vec::new(),
-        texture: flakes.texture,
-    };
+    let grids = [flakes.theta_h.clone(), flakes.theta_d.clone()];
+    let mut reduced = Flakes::without_slices(grids, flakes.texture);
     for slice in slices {
-        for (p, lower, upper) in slice {
-            reduced.probability.push(p);
-            reduced.lower.push(lower);
-            reduced.upper.push(upper);
-        }
-        reduced
-            .offsets
-            .push(u32::try_from(reduced.probability.len()).unwrap_or(u32::MAX));
+        let probability: Vec<f64> = slice.iter().map(|of| of.0).collect();
+        let lower: Vec<[f32; 3]> = slice.iter().map(|of| of.1).collect();
+        let upper: Vec<[f32; 3]> = slice.iter().map(|of| of.2).collect();
+        reduced.push_slice(&probability, &lower, &upper);
     }
     reduced
 }
 
 fn reduce_slice(slice: &Slice<'_>, most: usize) -> Vec<Boxed> {
-    let mut heaps: Vec<Heap> = (0..slice.probability.len())
-        .map(|k| Heap::of(slice, k))
+    let mut clusters: Vec<Merged> = (0..slice.probability.len())
+        .map(|k| Merged::of(slice, k))
         .collect();
-    merge_nearest(&mut heaps, most);
-    heaps.sort_by(|x, y| x.center[0].total_cmp(&y.center[0]));
-    heaps.iter().map(Heap::boxed).collect()
+    merge_nearest(&mut clusters, most);
+    clusters.sort_by(|x, y| x.center[0].total_cmp(&y.center[0]));
+    clusters.iter().map(Merged::boxed).collect()
 }
 
-impl Heap {
+impl Merged {
     fn of(slice: &Slice<'_>, k: usize) -> Self {
         let (lower, upper) = (slice.lower[k], slice.upper[k]);
         let half: [f64; 3] =
@@ -92,8 +81,9 @@ impl Heap {
         let share = if mass > 0.0 { other.mass / mass } else { 0.5 };
         let mix = |x: f64, y: f64| x + (y - x) * share;
         let center: [f64; 3] = std::array::from_fn(|a| mix(self.center[a], other.center[a]));
-        let spread =
-            |heap: &Self, a: usize| heap.variance[a] + (heap.center[a] - center[a]).powi(2);
+        let spread = |cluster: &Self, a: usize| {
+            cluster.variance[a] + (cluster.center[a] - center[a]).powi(2)
+        };
         Self {
             mass,
             center,
@@ -112,42 +102,44 @@ impl Heap {
     }
 }
 
-/// Merges pairs, nearest first, until `most` are left. Each heap remembers its nearest later one.
-fn merge_nearest(heaps: &mut Vec<Heap>, most: usize) {
-    let nearest_after = |heaps: &[Heap], i: usize| {
+/// Merges pairs, nearest first, until `most` are left. Each cluster remembers its nearest later one.
+fn merge_nearest(clusters: &mut Vec<Merged>, most: usize) {
+    let nearest_after = |clusters: &[Merged], i: usize| {
         let mut best = (usize::MAX, f64::INFINITY);
-        for j in i + 1..heaps.len() {
-            let distance = heaps[i].distance(&heaps[j]);
+        for j in i + 1..clusters.len() {
+            let distance = clusters[i].distance(&clusters[j]);
             if distance < best.1 {
                 best = (j, distance);
             }
         }
         best
     };
-    let mut nearest: Vec<(usize, f64)> =
-        (0..heaps.len()).map(|i| nearest_after(heaps, i)).collect();
-    while heaps.len() > most {
-        let Some(i) = (0..heaps.len() - 1).min_by(|&x, &y| nearest[x].1.total_cmp(&nearest[y].1))
+    let mut nearest: Vec<(usize, f64)> = (0..clusters.len())
+        .map(|i| nearest_after(clusters, i))
+        .collect();
+    while clusters.len() > most {
+        let Some(i) =
+            (0..clusters.len() - 1).min_by(|&x, &y| nearest[x].1.total_cmp(&nearest[y].1))
         else {
             return;
         };
-        let j = nearest[i].0.min(heaps.len() - 1);
-        let merged = heaps[i].with(&heaps[j]);
-        heaps[i] = merged;
-        // Later heaps move down by one place, so every index beyond j does too.
-        heaps.remove(j);
+        let j = nearest[i].0.min(clusters.len() - 1);
+        let merged = clusters[i].with(&clusters[j]);
+        clusters[i] = merged;
+        // Later clusters move down by one place, so every index beyond j does too.
+        clusters.remove(j);
         nearest.remove(j);
-        for k in 0..heaps.len() {
+        for k in 0..clusters.len() {
             let known = nearest[k].0;
             if k == i || known == i || known == j {
-                nearest[k] = nearest_after(heaps, k);
+                nearest[k] = nearest_after(clusters, k);
                 continue;
             }
             if known != usize::MAX && known > j {
                 nearest[k].0 = known - 1;
             }
             if k < i {
-                let distance = heaps[k].distance(&heaps[i]);
+                let distance = clusters[k].distance(&clusters[i]);
                 if distance < nearest[k].1 {
                     nearest[k] = (i, distance);
                 }

@@ -16,7 +16,7 @@
 use std::sync::OnceLock;
 
 use super::flakes::FlakeTexture;
-use super::sparkle::{RANK, mix, unit};
+use super::sparkle::{RANK, pcg, unit};
 
 /// A tile of cell numbers that repeats over the paint.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -111,9 +111,9 @@ impl RandomTexture {
         if (tile_x, tile_y) == (0, 0) {
             return cell;
         }
-        let turn = mix(tile_x
+        let turn = pcg(tile_x
             .cast_unsigned()
-            .wrapping_add(mix(tile_y.cast_unsigned())));
+            .wrapping_add(pcg(tile_y.cast_unsigned())));
         // Each part goes round by itself.
         let part = |bits: u32| (cell & bits).wrapping_add(turn & bits) & bits;
         part(RANK) | part(0xff00) | part(0x00ff)
@@ -172,9 +172,9 @@ impl Buckets {
                 + column.rem_euclid(columns)) as u32;
             for k in 0..PER_BUCKET {
                 let index = bucket.wrapping_mul(PER_BUCKET).wrapping_add(k);
-                let hash = mix(index ^ mix(self.seed));
+                let hash = pcg(index ^ pcg(self.seed));
                 #[allow(clippy::cast_precision_loss)] // small integers
-                let place = |at: i64, salt: u32| at as f64 + f64::from(unit(mix(hash ^ salt)));
+                let place = |at: i64, salt: u32| at as f64 + f64::from(unit(pcg(hash ^ salt)));
                 let (x, y) = (place(column, 0x68bc_21eb), place(row, 0x02e5_be93));
                 points.push((x * self.step[0], y * self.step[1], index));
             }
@@ -229,11 +229,11 @@ fn deal_numbers(cells: &mut [u32], seed: u32) {
     for &index in &*cells {
         area[index as usize] += 1;
     }
-    let order = mix(seed ^ 0xa511_e9b3);
+    let order = pcg(seed ^ 0xa511_e9b3);
     #[allow(clippy::cast_possible_truncation)] // indices are 32 bit
     let mut dealt: Vec<(u32, u32)> = (0..points as u32)
         .filter(|k| area[*k as usize] > 0)
-        .map(|k| (mix(k ^ order), k))
+        .map(|k| (pcg(k ^ order), k))
         .collect();
     dealt.sort_unstable();
     let (whole, mut before) = (cells.len() as u64, 0_u64);

@@ -87,26 +87,50 @@ impl Flakes {
     /// When an index is outside the grid.
     #[must_use]
     pub fn only(&self, theta_h: &[usize], theta_d: &[usize]) -> Self {
-        let mut kept = Self {
-            theta_h: self.theta_h.at(theta_h),
-            theta_d: self.theta_d.at(theta_d),
+        let grids = [self.theta_h.at(theta_h), self.theta_d.at(theta_d)];
+        let mut kept = Self::without_slices(grids, self.texture);
+        for &h in theta_h {
+            for &d in theta_d {
+                let slice = self.slice(h, d);
+                kept.push_slice(slice.probability, slice.lower, slice.upper);
+            }
+        }
+        kept
+    }
+
+    /// Flakes on these grids of θh and θd whose slices follow, θd fastest.
+    #[must_use]
+    pub(crate) fn without_slices(
+        [theta_h, theta_d]: [AngleGrid; 2],
+        texture: FlakeTexture,
+    ) -> Self {
+        Self {
+            theta_h,
+            theta_d,
             offsets: vec![0].into(),
             probability: SharedList::default(),
             lower: Vec::new(),
             upper: Vec::new(),
-            texture: self.texture,
-        };
-        for &h in theta_h {
-            for &d in theta_d {
-                let slice = self.slice(h, d);
-                kept.probability.extend_from_slice(slice.probability);
-                kept.lower.extend_from_slice(slice.lower);
-                kept.upper.extend_from_slice(slice.upper);
-                #[allow(clippy::cast_possible_truncation)] // no more than there were
-                kept.offsets.push(kept.probability.len() as u32);
-            }
+            texture,
         }
-        kept
+    }
+
+    /// The next slice: its clusters' shares and corners.
+    ///
+    /// # Panics
+    ///
+    /// Beyond 2^32 clusters in all, which no limit lets in.
+    pub(crate) fn push_slice(
+        &mut self,
+        probability: &[f64],
+        lower: &[[f32; 3]],
+        upper: &[[f32; 3]],
+    ) {
+        self.probability.extend_from_slice(probability);
+        self.lower.extend_from_slice(lower);
+        self.upper.extend_from_slice(upper);
+        let end = u32::try_from(self.probability.len()).expect("fewer clusters than 2^32");
+        self.offsets.push(end);
     }
 
     /// Every `step`-th angle of either grid, and the last.

@@ -57,6 +57,7 @@ pub use residuals::{
     ReadingResiduals,
 };
 pub use shared_list::SharedList;
+pub(crate) use sparkle::pcg;
 pub use sparkle::{FlakeSampler, TexelDraw, cumulative};
 pub use validate::{
     GRAINS_UM, LIFETIMES_DEG, MAX_ALPHA, MAX_LAB, MAX_WEIGHT, MIN_ALPHA, PaintError, TEXELS_UM,

@@ -21,7 +21,7 @@ use crate::color::{D65_2, expand_f32, xyz_to_rgb};
 
 /// One step of the permuted congruential generator: every bit of the answer depends on every bit of `x`.
 #[must_use]
-pub(crate) const fn mix(x: u32) -> u32 {
+pub(crate) const fn pcg(x: u32) -> u32 {
     let state = x.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
     (word >> 22) ^ word
@@ -68,7 +68,7 @@ impl TexelDraw {
         let phase = |byte: u32| ((byte & 0xff) as f32 + 0.5) / 256.0;
         let h = epoch(theta_h_deg, persistence_deg[0], phase(cell));
         let d = epoch(theta_d_deg, persistence_deg[1], phase(cell >> 8));
-        let key = mix(cell ^ mix(h ^ mix(d ^ 0xc2b2_ae35)));
+        let key = pcg(cell ^ pcg(h ^ pcg(d ^ 0xc2b2_ae35)));
         let factor = EPOCH_FACTORS[(h.wrapping_add(d.wrapping_mul(2)) & 3) as usize];
         // What follows the rank's 16 bits is as good as random.
         let turned = (cell & RANK)
@@ -78,9 +78,9 @@ impl TexelDraw {
         Self {
             pick: unit(turned),
             place: [
-                unit(mix(key ^ 0x2545_f491)),
-                unit(mix(key ^ 0x51ed_270b)),
-                unit(mix(key ^ 0x7feb_352d)),
+                unit(pcg(key ^ 0x2545_f491)),
+                unit(pcg(key ^ 0x51ed_270b)),
+                unit(pcg(key ^ 0x7feb_352d)),
             ],
         }
     }

@@ -9,6 +9,8 @@
 //!
 //! A pixel's points depend on its position, the seed and the index, never on threads or time.
 
+use crate::paint::pcg;
+
 /// The points of one pixel: a run of one sequence over the whole picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Points {
@@ -22,7 +24,7 @@ impl Points {
         let run = count.next_power_of_two();
         Self {
             first: (spread(x) | (spread(y) << 1)).wrapping_mul(run),
-            seed: hash(seed),
+            seed: pcg(seed),
         }
     }
 
@@ -33,7 +35,7 @@ impl Points {
 
     /// Draw `draw` of `draws` for point `index`; all draws of all points together are evenly spread.
     pub(super) fn one_of(self, draw: u32, draws: u32, index: u32, pair: u32) -> [f32; 2] {
-        let seed = hash(self.seed ^ pair.wrapping_mul(0x9e37_79b9));
+        let seed = pcg(self.seed ^ pair.wrapping_mul(0x9e37_79b9));
         let index = self
             .first
             .wrapping_add(index)
@@ -78,13 +80,6 @@ fn scramble(x: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x0552_6c56);
     x ^= x.wrapping_mul(0x53a2_2864);
     x.reverse_bits()
-}
-
-/// A finaliser of M. O'Neill's PCG family.
-pub(super) const fn hash(x: u32) -> u32 {
-    let state = x.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-    (word >> 22) ^ word
 }
 
 #[allow(clippy::cast_precision_loss)] // 24 bits are exact in an f32

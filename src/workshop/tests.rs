@@ -43,7 +43,7 @@ fn every_number_of_every_document_is_explained_with_its_report() {
         flake_lightness: Some(vec![-40.0, 41.0, 0.0]),
         flake_color: Some(vec![0.0, 0.0, 1.0]),
         flake_saturation: 0.5,
-        ..RealisationWeights::even(vec![0.2, 0.3, 0.5])
+        ..RealisationWeights::uniform(vec![0.2, 0.3, 0.5])
     };
     let file = |format| {
         realise(&thing, Some(&weights), format, &profile)

@@ -46,7 +46,7 @@ fn main() -> Outcome<()> {
     if wanted("realise") {
         realise(&blend)?;
     }
-    let even = RealisationWeights::even(vec![1.0 / inputs.len() as f64; inputs.len()]);
+    let even = RealisationWeights::uniform(vec![1.0 / inputs.len() as f64; inputs.len()]);
     let realised = blend.realise(&even)?.paint;
     let about = About {
         name: "bench".to_owned(),
@@ -161,7 +161,7 @@ fn realise(blend: &Blend) -> Outcome<()> {
     let even = 1.0 / count as f64;
     let mut outside = vec![-0.3 / (count - 1) as f64; count];
     outside[0] = 1.3;
-    let weights = RealisationWeights::even(vec![even; count]);
+    let weights = RealisationWeights::uniform(vec![even; count]);
     let first = blend.realise(&weights)?;
     let clusters = first.paint.flakes.as_ref().map_or(0, Flakes::clusters);
     let inputs: Vec<Vec<f32>> = (0..count)
@@ -204,7 +204,10 @@ fn realise(blend: &Blend) -> Outcome<()> {
     let mut old = Some(first);
     for (what, weights) in [
         ("", weights),
-        (", weights outside 0..1", RealisationWeights::even(outside)),
+        (
+            ", weights outside 0..1",
+            RealisationWeights::uniform(outside),
+        ),
         (", half the saturation", pale),
     ] {
         let ours = cpu(25, || {

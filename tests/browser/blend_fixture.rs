@@ -44,7 +44,7 @@ pub fn write(folder: &Path) -> Result<(), Anything> {
 fn case(blend: &Blend, weights: &RealisationWeights) -> Result<Value, Anything> {
     #[allow(clippy::cast_precision_loss)] // two or three paints
     let equal = vec![1.0 / blend.len() as f64; blend.len()];
-    let even = blend.realise(&RealisationWeights::even(equal))?.paint;
+    let even = blend.realise(&RealisationWeights::uniform(equal))?.paint;
     let paint = blend.realise(weights)?.paint;
     let own = |list: &Option<Vec<f64>>| list.as_ref().unwrap_or(&weights.weights).clone();
     let mut case = expected(&paint, tile_of(&even));
@@ -64,32 +64,32 @@ fn case(blend: &Blend, weights: &RealisationWeights) -> Result<Value, Anything> 
 
 fn duo_weights() -> Vec<RealisationWeights> {
     vec![
-        RealisationWeights::even(vec![0.5, 0.5]),
-        RealisationWeights::even(vec![0.3, 0.7]),
-        RealisationWeights::even(vec![1.0, 0.0]),
-        RealisationWeights::even(vec![-0.4, 1.4]),
-        RealisationWeights::even(vec![1.8, -0.8]),
-        RealisationWeights::even(vec![0.55, -0.5]),
+        RealisationWeights::uniform(vec![0.5, 0.5]),
+        RealisationWeights::uniform(vec![0.3, 0.7]),
+        RealisationWeights::uniform(vec![1.0, 0.0]),
+        RealisationWeights::uniform(vec![-0.4, 1.4]),
+        RealisationWeights::uniform(vec![1.8, -0.8]),
+        RealisationWeights::uniform(vec![0.55, -0.5]),
         RealisationWeights {
             base: Some(vec![0.2, 0.8]),
             flake_lightness: Some(vec![0.9, 0.1]),
             flake_color: Some(vec![0.0, 1.0]),
             flake_saturation: 0.6,
-            ..RealisationWeights::even(vec![0.5, 0.5])
+            ..RealisationWeights::uniform(vec![0.5, 0.5])
         },
     ]
 }
 
 fn trio_weights() -> Vec<RealisationWeights> {
     vec![
-        RealisationWeights::even(vec![0.2, 0.3, 0.5]),
-        RealisationWeights::even(vec![0.0, 1.0, 0.0]),
-        RealisationWeights::even(vec![0.9, -0.5, 0.6]),
+        RealisationWeights::uniform(vec![0.2, 0.3, 0.5]),
+        RealisationWeights::uniform(vec![0.0, 1.0, 0.0]),
+        RealisationWeights::uniform(vec![0.9, -0.5, 0.6]),
         RealisationWeights {
             flake_lightness: Some(vec![1.2, 0.1, -0.3]),
             flake_color: Some(vec![0.1, 0.2, 0.7]),
             flake_saturation: 1.5,
-            ..RealisationWeights::even(vec![0.6, 0.3, 0.1])
+            ..RealisationWeights::uniform(vec![0.6, 0.3, 0.1])
         },
     ]
 }

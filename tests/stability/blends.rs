@@ -845,6 +845,6 @@ fn one_paint_or_six_are_refused_with_their_number() {
         assert_eq!(refused.expect_err("refused"), BlendError::Paints(n));
     }
     let five = Blend::new(&ingredients(5), &BlendSettings::default(), &|_| ()).expect("five");
-    five.realise(&RealisationWeights::even(vec![0.2; 5]))
+    five.realise(&RealisationWeights::uniform(vec![0.2; 5]))
         .expect("five weights");
 }

@@ -165,7 +165,7 @@ pub fn blend(paints: &[&CarPaint]) -> Blend {
 
 pub fn realise(blend: &Blend, weights: &[f64]) -> Realised {
     blend
-        .realise(&RealisationWeights::even(weights.to_vec()))
+        .realise(&RealisationWeights::uniform(weights.to_vec()))
         .expect("one finite weight a paint")
 }
 

@@ -64,7 +64,7 @@ fn weights_that_are_no_numbers_are_refused_by_list_place_and_value() {
         -f64::MAX,
     ] {
         let ask = |change: &dyn Fn(&mut RealisationWeights)| {
-            let mut weights = RealisationWeights::even(vec![0.5, 0.5]);
+            let mut weights = RealisationWeights::uniform(vec![0.5, 0.5]);
             change(&mut weights);
             blend.realise(&weights).expect_err("refused")
         };
@@ -96,7 +96,7 @@ fn weights_that_are_no_numbers_are_refused_by_list_place_and_value() {
         }
     }
     for count in [0, 1, 3] {
-        let error = blend.realise(&RealisationWeights::even(vec![0.5; count]));
+        let error = blend.realise(&RealisationWeights::uniform(vec![0.5; count]));
         assert!(
             matches!(error, Err(WeightError::Count { given, needed: 2, .. }) if given == count)
         );
@@ -107,7 +107,7 @@ fn weights_that_are_no_numbers_are_refused_by_list_place_and_value() {
 fn the_largest_weights_that_are_accepted_end_in_a_paint() {
     let blend = blend(&[&metallic(1, H, D), &metallic(2, H, D)]);
     for far in FAR {
-        let mut weights = RealisationWeights::even(far.to_vec());
+        let mut weights = RealisationWeights::uniform(far.to_vec());
         for saturation in [1.0, 0.0, -1.0, 1e12] {
             weights.flake_saturation = saturation;
             let realised = blend.realise(&weights).expect("finite weights");
@@ -459,7 +459,7 @@ fn weights_that_sum_to_nothing_are_allowed_and_the_sum_is_told() {
 #[test]
 fn each_part_answers_to_its_own_weights_only() {
     let blend = blend(&[&metallic(3, H, D), &metallic(4, H, D)]);
-    let mut weights = RealisationWeights::even(vec![1.0, 0.0]);
+    let mut weights = RealisationWeights::uniform(vec![1.0, 0.0]);
     weights.flake_lightness = Some(vec![-3.0, 4.0]);
     let moved = blend.realise(&weights).expect("finite").paint;
     let still = realise(&blend, &[1.0, 0.0]).paint;

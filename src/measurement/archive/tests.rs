@@ -77,7 +77,7 @@ fn no_more_of_a_directory_is_read_than_the_accepted_files_need() {
     };
     // 1.2 MB of directory, the end of which lies where only the reader of archives still looks for it.
     let mut beyond = of_files(5000);
-    beyond.extend([0; 65_540]);
+    beyond.extend(std::iter::repeat_n(0, 65_540));
     let told = Archive::in_memory(beyond.into(), &few).expect_err("too long");
     assert!(told.to_string().contains("longer than"), "{told}");
     assert!(Archive::in_memory(of_files(10).into(), &few).is_ok());

@@ -170,14 +170,7 @@ pub async fn picked(
     (mut view, format): (View, PictureFormat),
     target: Target,
 ) -> Result<(View, Picked), Problem> {
-    let whole = (
-        &thing.id,
-        thing.file.to_string(),
-        weights,
-        &view,
-        format,
-        target,
-    );
+    let whole = (&thing.id, thing.file, weights, &view, format, target);
     let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(thing), weights.cloned());
     let wanted = view.clone();
     let unread = app.unread(view.environment.as_deref()).await?;

@@ -45,10 +45,7 @@ pub async fn bundle(
     let asked = query.profile.unwrap_or_default();
     asked.fits(&blend)?;
     let profile = asked.of_query()?;
-    let key = ids::result(
-        "blend_bundle",
-        &(&blend.id, blend.file.to_string(), profile.export),
-    );
+    let key = ids::result("blend_bundle", &(&blend.id, blend.file, profile.export));
     let (name, keep) = (format!("{}.zip", blend.id), blend.keep());
     let on = app.clone();
     let compute = move || async move {

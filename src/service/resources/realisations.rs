@@ -91,7 +91,7 @@ async fn realise(
     let mut profile = asked.of_query()?;
     let mut picked = None;
     if target.is_some() {
-        let asked = (&thing.id, thing.file.to_string(), &weights, format, target);
+        let asked = (&thing.id, thing.file, &weights, format, target);
         let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(&thing), weights.clone());
         let found = app.pick(&asked, move || {
             let asked = Asked::Realise {
@@ -107,13 +107,7 @@ async fn realise(
     }
     let key = ids::result(
         "realisation",
-        &(
-            &thing.id,
-            thing.file.to_string(),
-            &weights,
-            format,
-            profile.export,
-        ),
+        &(&thing.id, thing.file, &weights, format, profile.export),
     );
     let name = format!("{}.{}", thing.id, format.ending());
     let keep = thing.keep();

@@ -186,12 +186,7 @@ async fn submitted(
     (mut order, target): (IngestOrder, Target),
     idempotency: &Idempotency,
 ) -> Result<Accepted, Problem> {
-    let whole = (
-        upload.to_string(),
-        &order,
-        target.max_error,
-        target.max_seconds,
-    );
+    let whole = (upload, &order, target.max_error, target.max_seconds);
     idempotency.claim(app, &ids::asked("paint", &whole)).await?;
     let mut picked = None;
     if target.is_some() {
@@ -199,7 +194,7 @@ async fn submitted(
         order.profile = *found.profile();
         picked = Some(found);
     }
-    let id = ids::made_of("p_", &(upload.to_string(), &order));
+    let id = ids::made_of("p_", &(upload, &order));
     let job = if app.catalogue.paint(&id).await?.is_some() {
         None
     } else {
@@ -218,7 +213,7 @@ async fn pick_for_upload(
     let local = app.blobs.local(upload).await?;
     let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
     let (works, order) = (Arc::clone(&app.works), order.clone());
-    let whole = (upload.to_string(), order.clone(), target);
+    let whole = (upload, order.clone(), target);
     let pick = move || {
         let asked = Asked::Ingest {
             upload: local.path(),

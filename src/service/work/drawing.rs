@@ -39,10 +39,7 @@ pub fn key(
     format: PictureFormat,
 ) -> Hash {
     match view.show {
-        Show::Paint => ids::result(
-            "preview",
-            &(&thing.id, thing.file.to_string(), weights, view, format),
-        ),
+        Show::Paint => ids::result("preview", &(&thing.id, thing.file, weights, view, format)),
         Show::Aspecular => ids::result("aspecular", &(view, format)),
     }
 }

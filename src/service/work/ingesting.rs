@@ -21,28 +21,15 @@ use crate::workshop::is_paint_file;
 /// What a job needs to make a paint.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct IngestRequest {
-    upload: Hash64,
+    upload: Hash,
     order: IngestOrder,
-}
-
-/// A hash in JSON.
-#[derive(Debug, Serialize, Deserialize)]
-struct Hash64(String);
-
-impl Hash64 {
-    fn hash(&self) -> Result<Hash, Problem> {
-        self.0.parse().map_err(Problem::internal)
-    }
 }
 
 impl IngestRequest {
     /// Of a blob that was kept.
     #[must_use]
     pub fn new(upload: Hash, order: IngestOrder) -> Self {
-        Self {
-            upload: Hash64(upload.to_string()),
-            order,
-        }
+        Self { upload, order }
     }
 }
 
@@ -54,7 +41,6 @@ pub async fn ingest(
 ) -> Result<Ended, Problem> {
     let id = &under_way.job().subject;
     let IngestRequest { upload, order } = under_way.request()?;
-    let upload = upload.hash()?;
     let Ok(there) = under_way.insist(app, || app.catalogue.paint(id)).await? else {
         return Ok(Err(CalledOff));
     };
@@ -99,7 +85,7 @@ pub async fn forget_upload(
     problem: Option<Kind>,
 ) -> Result<(), Problem> {
     let request: IngestRequest = serde_json::from_str(&job.request).map_err(Problem::internal)?;
-    let upload = request.upload.hash()?;
+    let upload = request.upload;
     if matches!(problem, Some(Kind::Internal | Kind::StorageFull)) {
         tracing::error!(%upload, job = job.id, "a job failed that its upload is not to blame for; the upload stays until the next start");
         return Ok(());

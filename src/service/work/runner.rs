@@ -179,15 +179,14 @@ async fn run(app: App, under_way: Arc<UnderWay>) {
             Some((JobState::Failed, Some(problem)))
         }
     };
-    let last = match ended {
-        Some((state, problem)) => end_insisting(&app, &under_way, state, problem).await,
-        None => {
-            // What is left running on record is begun again all the same.
-            if let Err(error) = app.catalogue.return_job(&job.id).await {
-                tracing::warn!(%error, job = job.id, "a job was not returned to the queue");
-            }
-            None
+    let last = if let Some((state, problem)) = ended {
+        end_insisting(&app, &under_way, state, problem).await
+    } else {
+        // What is left running on record is begun again all the same.
+        if let Err(error) = app.catalogue.return_job(&job.id).await {
+            tracing::warn!(%error, job = job.id, "a job was not returned to the queue");
         }
+        None
     };
     app.jobs.under_way().remove(&job.id);
     // What has no end on record is begun again at the next start.

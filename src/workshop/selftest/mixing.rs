@@ -132,7 +132,7 @@ fn blend(first: &CarPaint, second: &CarPaint) -> Option<Blend> {
 }
 
 fn at(blend: &Blend, weights: [f64; 2]) -> Option<CarPaint> {
-    let weights = RealisationWeights::even(weights.to_vec());
+    let weights = RealisationWeights::uniform(weights.to_vec());
     blend.realise(&weights).ok().map(|realised| realised.paint)
 }
 

@@ -14,7 +14,6 @@ pub(super) use self::realise::realise;
 use super::material::clustered;
 use crate::accuracy::study::Point;
 use crate::accuracy::{PRESETS, Profile, ResultError};
-use crate::blend::RealisationWeights;
 use crate::fit::{BoxRule, ClusterSettings};
 use crate::workshop::WorkshopError;
 
@@ -91,10 +90,6 @@ fn with_clusters(counts: &[usize]) -> impl Iterator<Item = Setting> {
         let flakes = clustered(n, BoxRule::Moments, 1);
         setting(format!("{n} clusters"), "clusters", with_flakes(flakes))
     })
-}
-
-fn even(paints: usize) -> RealisationWeights {
-    RealisationWeights::even(vec![1.0 / paints as f64; paints])
 }
 
 /// The error of what a study clustered itself is known.

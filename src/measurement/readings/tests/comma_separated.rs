@@ -254,7 +254,7 @@ fn a_spectrum_that_is_not_usable_leaves_lab_with_a_warning() {
     );
     let assumed = |text: &str| csv(text).warnings.join("; ").contains("illuminant D65");
     assert!(assumed("aspecular_deg,L,a,b,nm550\n15,90,0,0,.5\n"));
-    let spectra: Vec<String> = (40..=70).map(|nm| format!("nm{}0", nm)).collect();
+    let spectra: Vec<String> = (40..=70).map(|tens| format!("nm{tens}0")).collect();
     let values = [".5"; 31].join(",");
     assert!(!assumed(&format!(
         "aspecular_deg,{}\n15,{values}\n",

@@ -1,8 +1,9 @@
 //! A blend at given weights becomes a picture.
 
-use super::{all, distinct, even, point, presets, setting, share, with_flakes};
+use super::{all, distinct, point, presets, setting, share, with_flakes};
 use crate::accuracy::Profile;
 use crate::accuracy::study::Front;
+use crate::blend::RealisationWeights;
 use crate::fit::BoxRule;
 use crate::paint::{Limits, PaintFile};
 use crate::render::{self, Film, Scene, Shape};
@@ -97,7 +98,7 @@ fn draw(
 ) -> Result<(f64, Film), WorkshopError> {
     let paints: Vec<&PaintFile> = material.fitted(&profile.flakes, 2)?.iter().collect();
     let blend = blend_paints(&paints, profile, &|_| ())?.blend;
-    let paint = blend.realise(&even(2))?.paint;
+    let paint = blend.realise(&RealisationWeights::equal(2))?.paint;
     let scene = Scene {
         samples_per_pixel: profile.samples_per_pixel,
         seed,

@@ -2,9 +2,10 @@
 
 use serde_json::Value;
 
-use super::{distinct, even, point, presets, setting, share, with_clusters};
+use super::{distinct, point, presets, setting, share, with_clusters};
 use crate::accuracy::Profile;
 use crate::accuracy::study::Front;
+use crate::blend::RealisationWeights;
 use crate::export::{ExportSettings, Precision};
 use crate::paint::PaintFile;
 use crate::workshop::realising::realise as realise_to;
@@ -68,7 +69,7 @@ pub(in crate::workshop::study) fn realise(
         let paints: Vec<&PaintFile> = material.fitted(&of.profile.flakes, 2)?.iter().collect();
         let blend = blend_paints(&paints, &of.profile, &|_| ())?.blend;
         let thing = Thing::Blend(Box::new(blend));
-        let (weights, profile) = (even(2), of.profile);
+        let (weights, profile) = (RealisationWeights::equal(2), of.profile);
         let go = || realise_to(&thing, Some(&weights), Format::Zip, &profile);
         // One file is written by one thread.
         let (seconds, made) = shortest(goes, 1, go)?;
