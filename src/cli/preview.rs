@@ -226,7 +226,16 @@ impl Preview {
         drop(progress);
         stages.end("write");
         stages.write(self.timings.as_deref())?;
-        let size = format!("{} x {}", self.frame.size.width, self.frame.size.height);
+        let noise = made.report.pointer("/rendering/sampling/mean_delta_e");
+        let noise = noise.and_then(serde_json::Value::as_f64);
+        let size = format!(
+            "{} x {}{}",
+            self.frame.size.width,
+            self.frame.size.height,
+            noise.map_or(String::new(), |noise| format!(
+                ", samples leave CIEDE2000 {noise:.2} to chance in the mean"
+            ))
+        );
         made::tell(
             json,
             &self.out,

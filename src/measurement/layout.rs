@@ -134,6 +134,10 @@ fn what_it_is(bytes: &[u8]) -> String {
         None if bytes.trim_ascii_start().starts_with(b"{") => {
             "is JSON; a package's paint.json comes zipped together with its pictures".to_owned()
         }
+        None if let Some(line) = head_of_table(bytes) => format!(
+            "begins with the line {line:?}; in a table of readings the first column is aspecular_deg, the angle from the \
+             mirror direction"
+        ),
         None if begin
             .iter()
             .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace()) =>
@@ -142,6 +146,18 @@ fn what_it_is(bytes: &[u8]) -> String {
         }
         None => format!("begins with {begin:02x?}"),
     }
+}
+
+/// The first line of a text that has columns, up to so many characters; remarks aside.
+fn head_of_table(bytes: &[u8]) -> Option<String> {
+    const SHOWN: usize = 60;
+    let text = bytes.get(..bytes.len().min(4096))?;
+    let mut lines = text.split(|b| matches!(b, b'\n' | b'\r'));
+    let line = lines.find(|line| !line.trim_ascii().is_empty() && !line.starts_with(b"#"))?;
+    let line = std::str::from_utf8(line).ok()?;
+    let is_table =
+        line.contains([',', ';', '\t']) && !line.chars().any(|c| c.is_control() && c != '\t');
+    is_table.then(|| line.chars().take(SHOWN).collect())
 }
 
 #[cfg(test)]
@@ -179,6 +195,10 @@ mod tests {
             (b"", "is empty"),
             (b"carpaint", "fitted already"),
             (b"\x00\x01", "begins with [00, 01]"),
+            (
+                b"# by hand\nangle,L,a,b\n15,9,0,0\n",
+                "\"angle,L,a,b\"; in a table",
+            ),
         ] {
             let error = sniff(bytes, &ReadOptions::default()).expect_err("no measurement");
             assert!(error.to_string().contains(what), "{error}");

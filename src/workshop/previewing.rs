@@ -155,13 +155,22 @@ pub fn preview(
         "rendering": rendering.report,
         "error": error_of(thing, weights),
     });
+    let mut notes = chosen.notes;
+    if let Some(lab) = error_of(thing, weights).lab.filter(|lab| *lab > TELLING) {
+        notes.push(format!(
+            "the flakes themselves are {lab:.2} Lab off, which no number of samples mends: cluster them more finely"
+        ));
+    }
     let made = Made {
         bytes,
         report,
-        notes: chosen.notes,
+        notes,
     };
     Ok(with_held(made, &scene))
 }
+
+/// Error of flakes, Lab, from which on a picture of them tells it.
+const TELLING: f64 = 1.0;
 
 /// The same with what of the surroundings is not drawn as bright as it was.
 fn with_held(mut made: Made, scene: &Scene) -> Made {

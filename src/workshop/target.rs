@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::estimate::{Estimate, Work};
 use super::realising::{Format, choose, error_of};
-use super::{IngestOptions, WorkshopError, blend_paints, open_paints};
+use super::{IngestOptions, Source, WorkshopError, blend_paints, find, is_paint_file, open_paints};
 use crate::accuracy::{Knobs, Profile, blend_error, file_error, writing_error};
 use crate::export::{ExportSettings, Precision};
 use crate::fit::ClusterSettings;
@@ -251,6 +251,13 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
         angle_step,
         ..standard.flakes
     };
+    let every_other_angle_or_all = vec![
+        Profile {
+            flakes: clustered(standard.flakes.clusters, 2),
+            ..standard
+        },
+        standard,
+    ];
     match work {
         Work::Ingest { .. } => [
             (24, 2),
@@ -260,6 +267,8 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
             (100, 1),
             (200, 1),
             (400, 1),
+            (1000, 1),
+            (4096, 1),
         ]
         .into_iter()
         .map(|(clusters, step)| Profile {
@@ -268,13 +277,12 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
         })
         .collect(),
         // Paints have the clusters that they have, unless they came of a blend.
-        Work::Blend { paints } if paints.iter().all(|paint| !paint.provenance.is_blend()) => vec![
-            Profile {
-                flakes: clustered(standard.flakes.clusters, 2),
-                ..standard
-            },
-            standard,
-        ],
+        Work::Blend { paints } if paints.iter().all(|paint| !paint.provenance.is_blend()) => {
+            every_other_angle_or_all
+        }
+        Work::BlendNames { names, .. } if names.iter().all(|name| is_paint(name)) => {
+            every_other_angle_or_all
+        }
         Work::BlendNames { .. } | Work::Blend { .. } => {
             let by = |clusters| Profile {
                 flakes: clustered(clusters, 1),
@@ -288,6 +296,8 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
                 by(100),
                 by(200),
                 Profile::reference(),
+                by(400),
+                by(1000),
             ]
         }
         // Of the formats only textures are rounded; of a picture any number of samples may be picked.
@@ -307,6 +317,11 @@ fn ladder(work: &Work<'_>) -> Vec<Profile> {
             })
             .collect(),
     }
+}
+
+/// Whether a name is that of a `.paint` file.
+fn is_paint(name: &str) -> bool {
+    matches!(find(name), Ok(Source::Path(path)) if is_paint_file(&path).unwrap_or(false))
 }
 
 /// Replaces an error that was estimated on some slices by the one of all.

@@ -12,7 +12,7 @@ async fn the_bundle_of_a_blend_is_made_once_and_kept_for_ever() {
     let blend = house.blend(&[&a, &b]).await;
     let address = format!("/v1/blends/{blend}/bundle.zip");
     assert_eq!(
-        house.get(&format!("/v1/blends/{blend}")).await.json()["links"]["slider_bundle"],
+        house.get(&format!("/v1/blends/{blend}")).await.json()["links"]["bundle"],
         address
     );
     let answers = join_all((0..8).map(|_| house.get(&address))).await;

@@ -72,7 +72,7 @@ impl Page {
         ));
         self.table(
             "fit",
-            "the floor is what a free function of θh and θd reaches on this measurement",
+            "the floor is what a free function of θh and θd reaches; a smooth fit may stay below it where the measurement is noisy",
             rows,
         );
     }

@@ -169,7 +169,7 @@ pub fn of_paint(record: &PaintRecord) -> Value {
             "paint": format!("{base}/paint"),
             "measurement": measurement,
             "preview": format!("{base}/preview.png"),
-            "bundle": format!("{base}/realisation.zip"),
+            "realisation": format!("{base}/realisation.zip"),
             "glb": format!("{base}/realisation.glb"),
             "readings": format!("{base}/readings"),
         }
@@ -188,8 +188,8 @@ pub fn of_blend(id: &str, paints: &[String], options: &BlendOptions) -> Value {
             "self": base,
             "paints": paints.iter().map(|paint| format!("/v1/paints/{paint}")).collect::<Vec<_>>(),
             "preview": format!("{base}/preview.png?weights={weights}"),
-            "bundle": format!("{base}/realisation.zip?weights={weights}"),
-            "slider_bundle": format!("{base}/bundle.zip"),
+            "bundle": format!("{base}/bundle.zip"),
+            "realisation": format!("{base}/realisation.zip?weights={weights}"),
             "glb": format!("{base}/realisation.glb?weights={weights}"),
         }
     })

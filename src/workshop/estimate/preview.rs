@@ -67,9 +67,14 @@ impl SmallPictures {
         self.tell(work.options.size, samples_per_pixel).0
     }
 
-    /// What the picture takes, with an error that is known.
+    /// What the picture takes, with its error where that is known.
     #[must_use]
-    pub fn estimate(&self, work: &PictureWork<'_>, profile: &Profile, error: f64) -> Estimate {
+    pub fn estimate(
+        &self,
+        work: &PictureWork<'_>,
+        profile: &Profile,
+        error: Option<f64>,
+    ) -> Estimate {
         let options = work.with(profile.samples_per_pixel);
         let (seconds, bytes) = self.tell(options.size, options.samples_per_pixel);
         let mut stages = vec![Stage {
@@ -83,7 +88,7 @@ impl SmallPictures {
             });
         }
         let error = EstimatedError {
-            value: Some(error),
+            value: error,
             unit: "CIEDE2000",
         };
         let drawn_with = Profile {
@@ -219,5 +224,5 @@ pub fn estimate_preview(
     let few = samples.min(2 * ENOUGH);
     let small = SmallPictures::draw(work, few, &SIDES, |of| shortest(|| work.draw(&of)))?;
     let error = work.error_of(samples)?;
-    Ok(small.estimate(work, profile, error))
+    Ok(small.estimate(work, profile, Some(error)))
 }

@@ -27,7 +27,7 @@ pub(super) fn ingest_readings(
         coat_of_index(ior)
     } else {
         warnings.push(format!(
-            "readings do not show the clear coat: one of index {ASSUMED_IOR} was assumed, as cars have; coat_ior says \
+            "readings do not show the clear coat: one of index {ASSUMED_IOR} was assumed, as cars have; --coat-ior, or coat_ior in a query, says \
              otherwise, 1 that there is none"
         ));
         Some(Coat::smooth(ASSUMED_IOR))

@@ -9,7 +9,7 @@ use crate::workshop::estimate::{PictureWork, SmallPictures};
 use crate::workshop::{MOST_SAMPLES, WorkshopError};
 
 /// Samples per pixel that the error is measured with first.
-const FIRST: u32 = 16;
+const FIRST: u32 = 8;
 /// How often a number is reckoned and measured.
 const GOES: usize = 4;
 /// Share of the error allowed that is aimed at, and that is near enough.
@@ -44,9 +44,6 @@ pub(super) fn pick_samples(
         let error = picture.error_of(samples)?;
         Ok::<_, WorkshopError>(Measured { samples, error })
     };
-    let begun = search.seconds();
-    let first = measure(few)?;
-    let seconds_a_sample = (search.seconds() - begun) / f64::from(few);
     // Most that are drawn in what is left of the time, if something else takes so many seconds before.
     let in_time = |before: f64| {
         let fits = |samples: u32| {
@@ -69,27 +66,33 @@ pub(super) fn pick_samples(
         }
         fit
     };
-    let wanted = match target.max_error {
-        // What leaves no time for a picture of as many samples is not measured.
-        Some(allowed) => samples_for(allowed, first, most, &mut |samples| {
-            let takes = seconds_a_sample * f64::from(samples);
-            let worth_it = samples <= in_time(takes);
-            worth_it.then(|| measure(samples)).transpose()
-        })?,
-        None => scaled(first, most),
-    };
-    // What is left when all this has been found out.
-    let left = in_time(0.0);
-    let chosen = if wanted.samples <= left {
-        wanted
-    } else {
-        scaled(first, left.max(1))
+    // What a picture's samples leave to chance is measured for a target that asks; otherwise the time is the picture's.
+    let (samples, error) = match target.max_error {
+        None => (in_time(0.0).max(1), None),
+        Some(allowed) => {
+            let begun = search.seconds();
+            let first = measure(few)?;
+            let seconds_a_sample = (search.seconds() - begun) / f64::from(few);
+            // What leaves no time for a picture of as many samples is not measured.
+            let wanted = samples_for(allowed, first, most, &mut |samples| {
+                let takes = seconds_a_sample * f64::from(samples);
+                let worth_it = samples <= in_time(takes);
+                worth_it.then(|| measure(samples)).transpose()
+            })?;
+            let left = in_time(0.0).max(1);
+            let chosen = if wanted.samples <= left {
+                wanted
+            } else {
+                scaled(first, left)
+            };
+            (chosen.samples, Some(chosen.error))
+        }
     };
     let profile = Profile {
-        samples_per_pixel: chosen.samples,
+        samples_per_pixel: samples,
         ..Profile::standard()
     };
-    let estimate = small.estimate(picture, &profile, chosen.error);
+    let estimate = small.estimate(picture, &profile, error);
     Ok(target.picked(estimate, tried, search.seconds()))
 }
 

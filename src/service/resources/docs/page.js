@@ -16,6 +16,11 @@ function resolve(schema) {
   return schema.$ref.slice(2).split("/").reduce((at, key) => at?.[key.replaceAll("~1", "/").replaceAll("~0", "~")], api) ?? {};
 }
 
+/** A text whose `words` stand in backticks: those as code. */
+function prose(text) {
+  return (text ?? "").split("`").map((part, k) => (k % 2 ? element("code", {}, part) : part));
+}
+
 /** A schema in a few words. */
 function words(schema) {
   if (!schema) return "";
@@ -45,7 +50,7 @@ function words(schema) {
 
 function table(heads, rows) {
   const head = element("tr", {}, ...heads.map((text) => element("th", {}, text)));
-  return element("table", {}, head, ...rows.map((cells) => element("tr", {}, ...cells.map((cell) => element("td", {}, cell ?? "")))));
+  return element("table", {}, head, ...rows.map((cells) => element("tr", {}, ...cells.map((cell) => element("td", {}, ...(typeof cell === "string" ? prose(cell) : [cell ?? ""]))))));
 }
 
 function properties(schema) {
@@ -72,7 +77,7 @@ function curl(method, path, operation) {
 
 function operationNode(method, path, operation) {
   const body = element("div", {});
-  if (operation.description) body.append(element("p", { class: "description" }, operation.description));
+  if (operation.description) body.append(element("p", { class: "description" }, ...prose(operation.description)));
   body.append(element("pre", {}, curl(method, path, operation)));
   if (operation.parameters?.length) {
     body.append(table(["parameter", "in", "", "what it is"], operation.parameters.map((one) => [
@@ -89,7 +94,7 @@ function operationNode(method, path, operation) {
   if (fields) body.append(element("h4", {}, words(shown)), fields);
   return element("details", { id: operation.operationId ?? "" },
     element("summary", {}, element("span", { class: "method" }, method.toUpperCase()), element("span", { class: "path" }, path),
-      element("span", { class: "short" }, operation.summary ?? "")),
+      element("span", { class: "short" }, ...prose(operation.summary))),
     body);
 }
 
@@ -101,11 +106,11 @@ async function draw() {
     about.textContent = `/openapi.json could not be read: ${error}`;
     return;
   }
-  about.textContent = api.info.description;
+  about.replaceChildren(...prose(api.info.description));
   about.classList.add("description");
   for (const tag of api.tags ?? []) {
     document.getElementById("tags").append(element("a", { href: `#${tag.name}` }, tag.name));
-    const section = element("section", { id: tag.name }, element("h2", {}, tag.name), element("p", {}, tag.description ?? ""));
+    const section = element("section", { id: tag.name }, element("h2", {}, tag.name), element("p", {}, ...prose(tag.description)));
     for (const [path, item] of Object.entries(api.paths)) {
       for (const method of METHODS) {
         if (item[method]?.tags?.includes(tag.name)) section.append(operationNode(method, path, item[method]));
