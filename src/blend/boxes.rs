@@ -23,8 +23,10 @@ const MODERATE: f64 = 4.0;
 /// What rounding may add to a 32-bit sum of five products: relative, 2^-24 for every product, sum and weight.
 const ROUNDING: f64 = 1.0 + 11.0 * 6e-8;
 
-/// Bits of a number without its sign.
+/// Bits of a number without its sign, and those of the bound.
 const MAGNITUDE: u32 = 0x7fff_ffff;
+#[allow(clippy::cast_possible_truncation)] // exact
+const BOUND: u32 = (MAX_LAB as f32).to_bits();
 
 /// How many corners had to be mended, and the worst of them.
 #[derive(Debug, Default, PartialEq)]
@@ -155,12 +157,12 @@ fn blocks<const PAINTS: usize>(
             paints.map(|own| &own.lower.as_flattened()[here.clone()]),
             paints.map(|own| &own.upper.as_flattened()[here.clone()]),
         ];
-        let (ordered, farthest) = if leaves {
+        let (ordered, beyond) = if leaves {
             sums::<PAINTS, true>(weights, lower, upper, low, high)
         } else {
             sums::<PAINTS, false>(weights, lower, upper, low, high)
         };
-        if f64::from(farthest) > MAX_LAB {
+        if beyond {
             for (low, high) in low.iter_mut().zip(high) {
                 [*low, *high] = account.mended([*low, *high].map(f64::from));
             }
@@ -190,8 +192,8 @@ impl Weight for [f32; BLOCK] {
     }
 }
 
-/// Both corners of a block of at most [`BLOCK`] numbers, whether no box is inside out, and, if `WATCH`ed, the largest
-/// magnitude.
+/// Both corners of a block of at most [`BLOCK`] numbers, whether no box is inside out, and, if `WATCH`ed,
+/// whether a number is beyond ±[`MAX_LAB`].
 ///
 /// A function of its own: its two outputs are known to be apart from everything else, so that the loop becomes vectors.
 #[inline(never)]
@@ -201,11 +203,11 @@ fn sums<const PAINTS: usize, const WATCH: bool>(
     upper: [&[f32]; PAINTS],
     low: &mut [f32],
     high: &mut [f32],
-) -> (bool, f32) {
+) -> (bool, bool) {
     let count = low.len().min(BLOCK);
     let (low, high) = (&mut low[..count], &mut high[..count]);
     let (lower, upper) = (lower.map(|l| &l[..count]), upper.map(|u| &u[..count]));
-    let (mut signs, mut most) = (0, 0);
+    let (mut signs, mut beyond) = (0_u32, 0_u32);
     for k in 0..count {
         let mut l = weights[0].at(k) * lower[0][k];
         let mut h = weights[0].at(k) * upper[0][k];
@@ -215,14 +217,13 @@ fn sums<const PAINTS: usize, const WATCH: bool>(
         }
         signs |= (h - l).to_bits();
         if WATCH {
-            // Magnitudes compare like their bits.
-            most = most
-                .max(l.to_bits() & MAGNITUDE)
-                .max(h.to_bits() & MAGNITUDE);
+            // Magnitudes compare like their bits: the sign says whether one is beyond the bound.
+            beyond |= BOUND.wrapping_sub(l.to_bits() & MAGNITUDE);
+            beyond |= BOUND.wrapping_sub(h.to_bits() & MAGNITUDE);
         }
         (low[k], high[k]) = (l, h);
     }
-    (signs >> 31 == 0, f32::from_bits(most))
+    (signs >> 31 == 0, beyond >> 31 == 1)
 }
 
 #[cfg(test)]
