@@ -4,6 +4,7 @@
 //! a time from the usual one on. Where an estimate's error is of a sample of the slices, the error is measured in full
 //! before a profile is picked for it. What is picked for a time limit depends on the machine; the result depends on the profile picked and on nothing else.
 
+mod ladder;
 mod samples;
 
 use std::time::Instant;
@@ -12,11 +13,10 @@ use serde::Serialize;
 
 use super::estimate::{Estimate, Work};
 use super::realising::{Format, choose, error_of};
-use super::{IngestOptions, Source, WorkshopError, blend_paints, find, is_paint_file, open_paints};
+use super::{IngestOptions, WorkshopError, blend_paints, open_paints};
 use crate::accuracy::{Knobs, Profile, blend_error, file_error, writing_error};
-use crate::export::{ExportSettings, Precision};
-use crate::fit::ClusterSettings;
 use crate::paint::PaintFile;
+use ladder::ladder;
 
 /// What a result should keep to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -241,87 +241,6 @@ impl Target {
             _ => in_time.into_iter().min_by(finer),
         }
     }
-}
-
-/// Profiles to pick from, by what the work's accuracy depends on, from cheap to dear.
-fn ladder(work: &Work<'_>) -> Vec<Profile> {
-    let standard = Profile::standard();
-    let clustered = |clusters, angle_step| ClusterSettings {
-        clusters,
-        angle_step,
-        ..standard.flakes
-    };
-    let every_other_angle_or_all = vec![
-        Profile {
-            flakes: clustered(standard.flakes.clusters, 2),
-            ..standard
-        },
-        standard,
-    ];
-    match work {
-        Work::Ingest { .. } => [
-            (24, 2),
-            (12, 1),
-            (24, 1),
-            (50, 1),
-            (100, 1),
-            (200, 1),
-            (400, 1),
-            (1000, 1),
-            (4096, 1),
-        ]
-        .into_iter()
-        .map(|(clusters, step)| Profile {
-            flakes: clustered(clusters, step),
-            ..standard
-        })
-        .collect(),
-        // Paints have the clusters that they have, unless they came of a blend.
-        Work::Blend { paints } if paints.iter().all(|paint| !paint.provenance.is_blend()) => {
-            every_other_angle_or_all
-        }
-        Work::BlendNames { names, .. } if names.iter().all(|name| is_paint(name)) => {
-            every_other_angle_or_all
-        }
-        Work::BlendNames { .. } | Work::Blend { .. } => {
-            let by = |clusters| Profile {
-                flakes: clustered(clusters, 1),
-                ..standard
-            };
-            vec![
-                Profile::draft(),
-                by(12),
-                by(24),
-                standard,
-                by(100),
-                by(200),
-                Profile::reference(),
-                by(400),
-                by(1000),
-            ]
-        }
-        // Of the formats only textures are rounded; of a picture any number of samples may be picked.
-        Work::Realise {
-            format: Format::Glb | Format::Paint,
-            ..
-        }
-        | Work::Preview(_) => vec![standard],
-        Work::Realise { .. } => [Precision::Eight, Precision::F16, Precision::F32]
-            .into_iter()
-            .map(|precision| Profile {
-                export: ExportSettings {
-                    precision,
-                    ..standard.export
-                },
-                ..standard
-            })
-            .collect(),
-    }
-}
-
-/// Whether a name is that of a `.paint` file.
-fn is_paint(name: &str) -> bool {
-    matches!(find(name), Ok(Source::Path(path)) if is_paint_file(&path).unwrap_or(false))
 }
 
 /// Replaces an error that was estimated on some slices by the one of all.
