@@ -56,7 +56,9 @@ impl Evaluate {
         )?;
         let mut clamps = Vec::new();
         let values = if self.raw {
-            self.weights.refuse_raw()?;
+            self.weights.refuse(
+                "--raw evaluates a measurement, which takes no weights: leave either out",
+            )?;
             let Source::Path(path) = find(&self.input)? else {
                 return Err(WorkshopError::input(
                     &self.input,

@@ -62,33 +62,22 @@ impl WeightArgs {
     /// The weights that this thing needs: a blend needs some, one paint takes none.
     pub fn for_thing(&self, thing: &Thing) -> Result<Option<RealisationWeights>, WorkshopError> {
         match thing {
-            Thing::Paint(_) => self.refuse().map(|()| None),
+            Thing::Paint(_) => {
+                self.refuse("this is one paint, weights are for a .blend: leave them out")?;
+                Ok(None)
+            }
             Thing::Blend(blend) => self
                 .for_blend(blend.ingredients().map(|(name, _)| name))
                 .map(Some),
         }
     }
 
-    /// One paint takes no weights: asking for some is a mistake worth telling.
-    pub fn refuse(&self) -> Result<(), WorkshopError> {
+    /// Weights where there is nothing to weigh are a mistake worth telling.
+    pub fn refuse(&self, why: &str) -> Result<(), WorkshopError> {
         if self.is_empty() {
             return Ok(());
         }
-        Err(WorkshopError::usage(
-            "--weights",
-            "this is one paint, weights are for a .blend: leave them out",
-        ))
-    }
-
-    /// A measurement takes none either.
-    pub fn refuse_raw(&self) -> Result<(), WorkshopError> {
-        if self.is_empty() {
-            return Ok(());
-        }
-        Err(WorkshopError::usage(
-            "--weights",
-            "--raw evaluates a measurement, which takes no weights: leave either out",
-        ))
+        Err(WorkshopError::usage("--weights", why))
     }
 
     /// The weights for a blend of the named paints.

@@ -231,43 +231,28 @@ impl EstimateOrder {
             ("show", self.show.is_some()),
             ("environment", self.environment.is_some()),
         ];
-        let (work, taken): (_, &[&str]) = match (self.work, &self.blend) {
-            (WorkName::Ingest, _) => ("ingest", &["paint"]),
-            (WorkName::Blend, _) => ("blend", &["paints"]),
-            (WorkName::Realise, None) => ("realise, of a paint,", &["paint", "format"]),
-            (WorkName::Realise, Some(_)) => (
-                "realise",
-                &[
-                    "paint",
-                    "blend",
-                    "weights",
-                    "base",
-                    "flake_lightness",
-                    "flake_color",
-                    "flake_saturation",
-                    "format",
-                ],
-            ),
-            (WorkName::Preview, None) => (
-                "preview, of a paint,",
+        let of_blend: &[&str] = &[
+            "blend",
+            "weights",
+            "base",
+            "flake_lightness",
+            "flake_color",
+            "flake_saturation",
+        ];
+        let (work, own): (_, &[&str]) = match self.work {
+            WorkName::Ingest => ("ingest", &["paint"]),
+            WorkName::Blend => ("blend", &["paints"]),
+            WorkName::Realise => ("realise", &["paint", "format"]),
+            WorkName::Preview => (
+                "preview",
                 &["paint", "scene", "size", "show", "environment"],
             ),
-            (WorkName::Preview, Some(_)) => (
-                "preview",
-                &[
-                    "paint",
-                    "blend",
-                    "weights",
-                    "base",
-                    "flake_lightness",
-                    "flake_color",
-                    "flake_saturation",
-                    "scene",
-                    "size",
-                    "show",
-                    "environment",
-                ],
-            ),
+        };
+        let weighs = matches!(self.work, WorkName::Realise | WorkName::Preview);
+        let (work, taken) = match &self.blend {
+            Some(_) if weighs => (work.to_owned(), [own, of_blend].concat()),
+            None if weighs => (format!("{work}, of a paint,"), own.to_vec()),
+            _ => (work.to_owned(), own.to_vec()),
         };
         match given.iter().find(|(name, is)| *is && !taken.contains(name)) {
             Some((name, _)) => Err(Problem::value(
