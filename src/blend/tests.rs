@@ -253,6 +253,23 @@ fn every_pair_says_how_far_it_is_from_the_best_of_its_own() {
 }
 
 #[test]
+fn slices_on_which_smoothing_does_not_converge_are_smoothed_more_and_counted() {
+    let paints = [3, 4].map(|seed| paint(seed, &[0.0, 40.0], &[0.0, 40.0]));
+    let paints: Vec<&CarPaint> = paints.iter().collect();
+    let by = |epsilon| {
+        let settings = BlendSettings {
+            method: crate::transport::Method::Sinkhorn { epsilon },
+            ..BlendSettings::default()
+        };
+        blend_by(&paints, &settings)
+    };
+    let (fine, coarse) = (by(1e-9), by(10.0));
+    assert!(fine.report.smoothed_more > 0, "{:?}", fine.report);
+    assert_eq!(coarse.report.smoothed_more, 0);
+    assert!(fine.report.mean_cost < coarse.report.mean_cost);
+}
+
+#[test]
 fn next_to_weight_one_it_is_the_same_to_a_millionth() {
     let (a, b) = (paint(6, H, D), paint(7, &[0.0, 20.0], D));
     let blend = blend(&[&a, &b]);

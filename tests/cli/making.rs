@@ -161,6 +161,22 @@ fn texels_are_flakes_at_one_angle_pair() {
     desk.ok(&[&words[..], &["--seed", "4", "--out", "t.exr"]].concat());
     desk.ok(&[&words[..], &["--seed", "5", "--out", "u.exr"]].concat());
     assert_ne!(desk.read("t.exr"), desk.read("u.exr"));
+    // What has to be clamped far outside is told, as it is of a realisation.
+    let far: Vec<&str> = words
+        .iter()
+        .map(|word| if *word == "1,0" { "-2,3" } else { *word })
+        .collect();
+    let far = json(
+        &desk
+            .ok(&[&far[..], &["--json", "--out", "t.exr"]].concat())
+            .stdout,
+    );
+    assert!(
+        far["clamps"]
+            .as_array()
+            .is_some_and(|told| !told.is_empty()),
+        "{far}"
+    );
     desk.refused(
         2,
         &[

@@ -167,6 +167,32 @@ async fn a_private_paint_is_left_out_of_lists() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_blend_stays_private_when_its_private_paint_is_deleted() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let (a, b) = (house.paint("silver").await, house.paint("blue").await);
+    let blend = format!("/v1/blends/{}", house.blend(&[&a, &b]).await);
+    let picture = format!("{blend}/realisation.zip?weights=1,0");
+    let kept = async |path: &str| {
+        let answer = house.get(path).await;
+        assert_eq!(answer.status, 200, "{answer:?}");
+        answer.header("cache-control").expect("says").to_owned()
+    };
+    assert!(kept(&picture).await.starts_with("public"));
+    let headers = [("Content-Type", "application/json")];
+    let address = format!("/v1/paints/{a}");
+    let private = br#"{"visibility": "private"}"#;
+    house.ask("PATCH", &address, &headers, private).await;
+    assert!(kept(&picture).await.starts_with("private"));
+    let gone = house.ask("DELETE", &address, &[], b"").await;
+    assert_eq!(gone.status, 204, "{gone:?}");
+    for path in [&blend, &picture] {
+        assert!(kept(path).await.starts_with("private"), "{path}");
+    }
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_blend_that_is_deleted_is_gone_with_its_file_and_can_be_made_again() {
     let data = folder();
     let house = House::open(data.path()).await;

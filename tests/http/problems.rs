@@ -135,6 +135,7 @@ async fn a_parameter_that_is_not_accepted_is_pointed_at() {
         (format!("/v1/paints/{paint}?verbose=1"), "/verbose"),
         ("/v1/paints?limit=0".to_owned(), "/limit"),
         ("/v1/paints?cursor=!".to_owned(), "/cursor"),
+        ("/v1/paints?cursor=zz".to_owned(), "/cursor"),
         ("/v1/paints?q=a&q=b".to_owned(), "/q"),
         (file.clone(), "/weights"),
         (format!("{file}?alpha=nan&beta=0"), "/alpha"),
