@@ -15,7 +15,9 @@
 use serde::Serialize;
 
 use super::WritingError;
+use super::writing::bundle_rounding_w1;
 use crate::blend::Blend;
+use crate::export::ExportSettings;
 use crate::paint::{Clustering, PaintFile};
 
 /// Error of a result against the reference: in Lab, the distance by which its flakes' colors are misplaced.
@@ -78,6 +80,7 @@ const TRANSPORT_SAMPLED: &str = "bounded on slices spread evenly over the angles
                                  several pairs of paints the worst";
 const ANGLES: &str = "measured: W1 of lightness between slices left out and the mixtures in their place, nine of ten of the \
                       compared slices are within; of several paints the worst";
+const ROUNDING_OF_ALL: &str = "bounded: W1 between the boxes and the boxes read back, worst slice of the worst paint";
 const ROUNDING: &str = "bounded: W1 between the boxes and the boxes read back, worst of the slices at the instrument geometries";
 
 /// Error of a paint; nothing is misplaced in a solid color.
@@ -139,6 +142,17 @@ pub fn file_error(of: &ResultError, writing: Option<&WritingError>) -> ResultErr
         how: ROUNDING,
     });
     ResultError::of(of.terms.iter().copied().chain(rounding).collect())
+}
+
+/// Error of the bundle of a whole blend, at any weights between 0 and 1 that sum to 1.
+#[must_use]
+pub fn bundle_error(blend: &Blend, settings: &ExportSettings) -> ResultError {
+    let rounding = bundle_rounding_w1(blend, settings).map(|lab| Term {
+        what: "rounding",
+        lab: Some(lab),
+        how: ROUNDING_OF_ALL,
+    });
+    ResultError::of(blend_error(blend).terms.into_iter().chain(rounding).collect())
 }
 
 fn clusters<'a>(of: impl Iterator<Item = Option<&'a Clustering>>) -> Term {

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::clustering::luminance_of;
 use super::geometries::{geometries, mixed};
+use crate::blend::{Blend, Boxes};
 use crate::color::{ciede2000, luminance};
 use crate::export::{ExportSettings, Rounding, inverse_cdf};
 use crate::paint::{CarPaint, LightnessMixture, Slice, mean_color};
@@ -30,7 +31,8 @@ type Corners = (Vec<[f32; 3]>, Vec<[f32; 3]>);
 #[must_use]
 pub fn writing_error(paint: &CarPaint, settings: &ExportSettings) -> Option<WritingError> {
     let flakes = paint.flakes.as_ref()?;
-    let rounding = Rounding::of(flakes, settings.precision);
+    let corners = flakes.lower.iter().chain(&flakes.upper);
+    let rounding = Rounding::of(corners, settings.precision);
     let mut error = WritingError::default();
     let mut loss: f64 = 0.0;
     for geometry in geometries(paint) {
@@ -39,10 +41,7 @@ pub fn writing_error(paint: &CarPaint, settings: &ExportSettings) -> Option<Writ
             met.iter().map(|&(w, k)| (w, flakes.slice_at(k))).collect();
         let written: Vec<Corners> = slices
             .iter()
-            .map(|(_, slice)| {
-                let back = |c: &[[f32; 3]]| c.iter().map(|&c| rounding.read_back(c)).collect();
-                (back(slice.lower), back(slice.upper))
-            })
+            .map(|(_, slice)| read_back(&rounding, slice))
             .collect();
         let rounded: Vec<(f64, Slice<'_>)> = slices
             .iter()
@@ -86,6 +85,44 @@ pub fn writing_error(paint: &CarPaint, settings: &ExportSettings) -> Option<Writ
     }
     error.inverse_cdf_loss = settings.inverse_cdf.then_some(loss);
     Some(error)
+}
+
+/// Distance W1 in Lab between the flakes of a blend at weights between 0 and 1 that sum to 1 and those of its bundle is at
+/// most this: that of the worst slice of the worst paint, for a mixture's corners are off by the mixture of its paints'.
+/// `None` for solid colors.
+#[must_use]
+pub fn bundle_rounding_w1(blend: &Blend, settings: &ExportSettings) -> Option<f64> {
+    let flakes = blend.flakes.as_ref()?;
+    let corners = flakes
+        .boxes
+        .iter()
+        .flat_map(|own| own.lower.iter().chain(&own.upper));
+    let rounding = Rounding::of(corners, settings.precision);
+    let moved_in = |own: &Boxes, ends: &[u32]| {
+        let range = ends[0] as usize..ends[1] as usize;
+        let slice = Slice {
+            probability: &flakes.probability[range.clone()],
+            lower: &own.lower[range.clone()],
+            upper: &own.upper[range],
+        };
+        let (lower, upper) = read_back(&rounding, &slice);
+        let written = Slice {
+            lower: &lower,
+            upper: &upper,
+            ..slice
+        };
+        moved(&slice, &written)
+    };
+    let each = flakes
+        .boxes
+        .iter()
+        .flat_map(|own| flakes.offsets.windows(2).map(move |ends| moved_in(own, ends)));
+    Some(each.fold(0.0, f64::max))
+}
+
+fn read_back(rounding: &Rounding, slice: &Slice<'_>) -> Corners {
+    let back = |c: &[[f32; 3]]| c.iter().map(|&c| rounding.read_back(c)).collect();
+    (back(slice.lower), back(slice.upper))
 }
 
 /// What moving every box's colors along with its corners costs: no color moves further than the farther corner per axis.

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::json;
 
 use super::ingest::ReadingArgs;
+use super::made::{self, Stages};
 use super::output;
-use super::profile::ProfileArgs;
-use crate::workshop::{WorkshopError, bundle_blend, open};
+use super::profile::TargetArgs;
+use crate::workshop::{Work, WorkshopError, bundle_blend, open};
 
 /// Write the texture bundle of a whole blend: its shader mixes the paints, so that sliders need no further request.
 ///
@@ -19,10 +19,13 @@ pub struct Bundle {
     #[arg(value_name = "BLEND")]
     input: String,
     #[command(flatten)]
-    profile: ProfileArgs,
+    target: TargetArgs,
     /// File to write.
     #[arg(long, value_name = "F.zip")]
     out: PathBuf,
+    /// Write the seconds each stage took.
+    #[arg(long, value_name = "T.json")]
+    timings: Option<PathBuf>,
 }
 
 impl Bundle {
@@ -34,16 +37,23 @@ impl Bundle {
             );
             return Err(WorkshopError::usage("--out", problem));
         }
-        let options = ReadingArgs::default().options(None, &self.profile)?;
+        let mut stages = Stages::begin();
+        let mut options = ReadingArgs::default().options(None, &self.target.profile)?;
         let blend = open(&self.input, &options, &|_| ())?;
-        let made = bundle_blend(&blend, &options.profile)?;
-        output::replace(&self.out, &made.bytes)?;
-        if json {
-            return output::print_json(
-                &json!({ "out": self.out.display().to_string(), "bytes": made.bytes.len(), "report": made.report }),
-            );
+        let picked = self.target.pick(&Work::Bundle {
+            thing: &blend,
+            written: true,
+        })?;
+        if let Some(picked) = &picked {
+            options.profile = *picked.profile();
         }
-        eprintln!("{}: {} bytes", self.out.display(), made.bytes.len());
-        Ok(())
+        stages.end("open");
+        let made = bundle_blend(&blend, &options.profile)?;
+        stages.end("bundle");
+        output::replace(&self.out, &made.bytes)?;
+        stages.end("write");
+        stages.write(self.timings.as_deref())?;
+        let size = format!("{} bytes", made.bytes.len());
+        made::tell(json, &self.out, &made, picked.as_ref(), &size)
     }
 }

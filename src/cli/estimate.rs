@@ -64,6 +64,14 @@ enum What {
         #[command(flatten)]
         target: TargetArgs,
     },
+    /// Of `carpaint bundle`.
+    Bundle {
+        /// A .blend.
+        #[arg(value_name = "BLEND")]
+        input: String,
+        #[command(flatten)]
+        target: TargetArgs,
+    },
     /// Of `carpaint preview`.
     Preview {
         /// A .paint, a .blend, a sample or a measurement.
@@ -100,6 +108,7 @@ impl Estimate {
             What::Ingest { target, .. }
             | What::Blend { target, .. }
             | What::Realise { target, .. }
+            | What::Bundle { target, .. }
             | What::Preview { target, .. } => target,
         };
         let options = ReadingArgs::default().options(None, &target.profile)?;
@@ -165,6 +174,16 @@ impl Estimate {
                     thing: &thing,
                     weights: weights.as_ref(),
                     format,
+                    written: true,
+                })?;
+                Ok(estimate.after(vec![opened]))
+            }
+            What::Bundle { input, .. } => {
+                let begun = Instant::now();
+                let thing = open(input, options, &|_| ())?;
+                let opened = opening(begun);
+                let estimate = of(&Work::Bundle {
+                    thing: &thing,
                     written: true,
                 })?;
                 Ok(estimate.after(vec![opened]))

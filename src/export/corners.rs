@@ -22,7 +22,8 @@ impl Textures {
             "corner of largest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
         let texels = lower.len().div_ceil(width) * width;
         let height = texels / width;
-        let range = (precision == Precision::Eight).then(|| Range8::of(lower, upper));
+        let range =
+            (precision == Precision::Eight).then(|| Range8::of(lower.iter().chain(upper)));
         let both = [
             ("corners_lower", lower, about_lower),
             ("corners_upper", upper, about_upper),
@@ -69,10 +70,10 @@ pub(super) struct Range8 {
 }
 
 impl Range8 {
-    pub(super) fn of(lower: &[[f32; 3]], upper: &[[f32; 3]]) -> Self {
+    pub(super) fn of<'a>(corners: impl Iterator<Item = &'a [f32; 3]>) -> Self {
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];
-        for corner in lower.iter().chain(upper) {
+        for corner in corners {
             for k in 0..3 {
                 low[k] = low[k].min(corner[k]);
                 high[k] = high[k].max(corner[k]);

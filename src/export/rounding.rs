@@ -4,7 +4,6 @@ use half::f16;
 
 use super::Precision;
 use super::corners::Range8;
-use crate::paint::Flakes;
 
 /// The rounding of corner textures.
 #[derive(Debug)]
@@ -14,11 +13,11 @@ pub struct Rounding {
 }
 
 impl Rounding {
-    /// How corners of these flakes are rounded.
+    /// How these corners, all that a texture has, are rounded.
     #[must_use]
-    pub fn of(flakes: &Flakes, precision: Precision) -> Self {
+    pub fn of<'a>(corners: impl Iterator<Item = &'a [f32; 3]>, precision: Precision) -> Self {
         let range = (precision == Precision::Eight).then(|| {
-            let range = Range8::of(&flakes.lower, &flakes.upper);
+            let range = Range8::of(corners);
             (range.scale, range.offset)
         });
         Self { precision, range }
@@ -54,8 +53,8 @@ mod tests {
         let paint = metallic(4, 3, 20);
         let flakes = paint.flakes.as_ref().expect("flakes");
         for precision in [Precision::F32, Precision::F16, Precision::Eight] {
-            let rounding = Rounding::of(flakes, precision);
             let corners = flakes.lower.iter().chain(&flakes.upper);
+            let rounding = Rounding::of(corners.clone(), precision);
             let worst = corners
                 .flat_map(|&c| {
                     let back = rounding.read_back(c);

@@ -150,6 +150,19 @@ pub struct JobRecord {
     pub attempts: u32,
     /// Why it failed: a JSON object.
     pub problem: Option<String>,
+    /// What its stages took, once it has ended: a JSON list.
+    pub stages: Option<String>,
+}
+
+/// How a job ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JobEnd<'a> {
+    /// Done, failed or cancelled.
+    pub state: JobState,
+    /// Why it failed: a JSON object.
+    pub problem: Option<&'a str>,
+    /// What its stages took: a JSON list.
+    pub stages: Option<&'a str>,
 }
 
 /// What came of submitting a job.
@@ -245,12 +258,7 @@ pub trait JobBook: Send + Sync {
     fn forget_ended_jobs(&self, keep: u32) -> Task<'_, ()>;
 
     /// Ends an unfinished job as done, failed or cancelled. `false` when it had ended already.
-    fn end_job<'a>(
-        &'a self,
-        id: &'a str,
-        state: JobState,
-        problem: Option<&'a str>,
-    ) -> Task<'a, bool>;
+    fn end_job<'a>(&'a self, id: &'a str, end: JobEnd<'a>) -> Task<'a, bool>;
 }
 
 /// The whole catalogue.

@@ -278,7 +278,7 @@ async fn records_conform(catalogue: &dyn Catalogue) {
     }
     assert!(
         catalogue
-            .end_job("j_wants", JobState::Cancelled, None)
+            .end_job("j_wants", ended(JobState::Cancelled))
             .await
             .expect("ends")
     );
@@ -299,6 +299,15 @@ fn new_job(id: &str, subject: &str, request: &str) -> NewJob {
         kind: JobKind::Ingest,
         subject: subject.to_owned(),
         request: request.to_owned(),
+    }
+}
+
+/// An end of which nothing else is told.
+fn ended(state: JobState) -> JobEnd<'static> {
+    JobEnd {
+        state,
+        problem: None,
+        stages: None,
     }
 }
 
@@ -399,18 +408,30 @@ async fn jobs_conform(catalogue: &dyn Catalogue) {
 
     assert!(
         catalogue
-            .end_job("j_1", JobState::Failed, Some("{}"))
+            .end_job(
+                "j_1",
+                JobEnd {
+                    problem: Some("{}"),
+                    stages: Some("[]"),
+                    ..ended(JobState::Failed)
+                },
+            )
             .await
             .expect("ends")
     );
     assert!(
         !catalogue
-            .end_job("j_1", JobState::Done, None)
+            .end_job("j_1", ended(JobState::Done))
             .await
             .expect("an end is an end")
     );
     catalogue.begin_job("j_1").await.expect("changes nothing");
     assert_eq!(state("j_1").await, (JobState::Failed, 1));
+    let there = catalogue.job("j_1").await.expect("reads").expect("there");
+    assert_eq!(
+        (there.problem.as_deref(), there.stages.as_deref()),
+        (Some("{}"), Some("[]"))
+    );
     assert!(
         catalogue
             .submit_job(&new_job("j_4", "p_1", "{}"))

@@ -25,7 +25,7 @@ mod whole_file;
 pub use blobs::{BlobBytes, BlobWriter, Blobs, Hash, LocalBlob, Stored, Task};
 pub use catalogue::{
     BlendRecord, Blends, Catalogue, EnvironmentPage, EnvironmentRecord, Environments, JobBook,
-    JobKind, JobRecord, JobState, NewJob, NotedPaint, PaintPage, PaintRecord, Paints, Submitted,
+    JobEnd, JobKind, JobRecord, JobState, NewJob, NotedPaint, PaintPage, PaintRecord, Paints, Submitted,
     Visibility,
 };
 pub use error::StoreError;

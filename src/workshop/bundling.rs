@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::describing::describe_correspondence;
 use super::{Made, Thing, WorkshopError};
-use crate::accuracy::{Profile, blend_error};
+use crate::accuracy::{Profile, bundle_error};
 use crate::blend::Blend;
 use crate::export::{self, About};
 use crate::paint::Provenance;
@@ -33,8 +33,8 @@ fn of_blend(blend: &Blend, profile: &Profile) -> Result<Made, WorkshopError> {
         "paints": names,
         "hashes": hashes,
         "correspondence": describe_correspondence(blend),
-        // At weights between 0 and 1 that sum to 1, before corners are rounded, which `flakes` tells of.
-        "accuracy": { "error": blend_error(blend) },
+        // At weights between 0 and 1 that sum to 1.
+        "accuracy": { "error": bundle_error(blend, &profile.export) },
     });
     let about = About {
         name: names.join(" + "),

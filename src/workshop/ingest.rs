@@ -175,7 +175,7 @@ pub fn is_paint_file(path: &Path) -> Result<bool, WorkshopError> {
 }
 
 /// Ingests an upload: a measurement, or a `.paint` that this program wrote. `path` is where the upload is kept, which
-/// its owner does not know and errors do not name.
+/// its owner does not know and errors do not name. `ended` hears of stages as in [`ingest_in_stages`].
 ///
 /// # Errors
 ///
@@ -184,6 +184,7 @@ pub fn ingest_upload(
     path: &Path,
     options: &IngestOptions,
     progress: &(dyn Fn(f32) + Sync),
+    ended: &dyn Fn(&'static str),
 ) -> Result<PaintFile, WorkshopError> {
     let named = |error: WorkshopError| WorkshopError {
         message: error
@@ -194,7 +195,7 @@ pub fn ingest_upload(
     if !is_paint_file(path)? {
         // The file is called by the hash of its bytes, which is no name: better what it says about itself.
         let description = |said: Option<&str>| said.unwrap_or_default().to_owned();
-        return ingest_called(path, options, description, progress, &|_| ()).map_err(named);
+        return ingest_called(path, options, description, progress, ended).map_err(named);
     }
     options.check_measured()?;
     // It is held in memory as a whole, as a table is.
@@ -205,9 +206,11 @@ pub fn ingest_upload(
     let bytes = read(path, &limits).map_err(named)?;
     let mut paint = PaintFile::from_bytes(&bytes, &limits)
         .map_err(|e| WorkshopError::input("the upload", e))?;
+    ended("open");
     options.check_clusters("the upload", &paint)?;
     // What a file says of itself is checked where that can be done, and marked where not.
     paint.energy = certify(&paint.paint);
+    ended("certificate");
     if paint.residuals.is_some() || paint.clustering.is_some() {
         paint.warnings.push(AS_UPLOADED.to_owned());
     }

@@ -13,8 +13,8 @@ use serde::Serialize;
 
 use super::estimate::{Estimate, Work};
 use super::realising::{Format, choose, error_of};
-use super::{IngestOptions, WorkshopError, blend_paints, open_paints};
-use crate::accuracy::{Knobs, Profile, blend_error, file_error, writing_error};
+use super::{IngestOptions, Thing, WorkshopError, blend_paints, open_paints};
+use crate::accuracy::{Knobs, Profile, blend_error, bundle_error, file_error, writing_error};
 use crate::paint::PaintFile;
 use ladder::ladder;
 
@@ -265,6 +265,11 @@ fn measure_error(
                 .then(|| writing_error(&paint, &profile.export))
                 .flatten();
             estimate.error.value = file_error(&error_of(thing, weights), writing.as_ref()).lab;
+        }
+        Work::Bundle { thing, .. } => {
+            if let Thing::Blend(blend) = thing {
+                estimate.error.value = bundle_error(blend, &profile.export).lab;
+            }
         }
         Work::BlendNames { names, options } => {
             let options = IngestOptions {

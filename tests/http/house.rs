@@ -40,6 +40,7 @@ impl Works for Pretend {
         upload: &Path,
         order: &IngestOrder,
         progress: Progress<'_>,
+        ended: &dyn Fn(&'static str),
     ) -> Result<PaintFile, WorkError> {
         let bytes =
             std::fs::read(upload).map_err(|error| refuse(Fault::Internal, error.to_string()))?;
@@ -58,6 +59,7 @@ impl Works for Pretend {
                 std::thread::sleep(Duration::from_millis(5));
             }
         }
+        ended("fit");
         let seed = f64::from(blake3::hash(&bytes).as_bytes()[0]) / 256.0;
         let lobes = vec![Lobe {
             weight: [0.1; 3],

@@ -43,6 +43,13 @@ async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
         (&json!("done"), &json!(1.0))
     );
     assert!(text.contains("seconds_left"));
+    let took = |stage: &str| {
+        let stages = job["stages"].as_array().expect("a list");
+        let own = stages.iter().find(|own| own["stage"] == stage);
+        own.and_then(|own| own["seconds"].as_f64()).expect("told")
+    };
+    assert!(took("waiting") < 4.0 && took("store") < 4.0, "{job}");
+    assert!((3.9..20.0).contains(&took("fit")), "{job}");
     assert_eq!(house.get(&address).await.json(), job);
     assert_eq!(
         house

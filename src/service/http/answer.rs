@@ -1,5 +1,6 @@
 //! Answers: bytes with a strong `ETag` of their content, and how long they may be kept.
 
+use std::borrow::Cow;
 use std::time::Duration;
 
 use axum::body::Body;
@@ -43,14 +44,14 @@ pub struct Answer {
     status: StatusCode,
     headers: HeaderMap,
     body: Body,
-    stages: Vec<(&'static str, Duration)>,
+    stages: Stages,
     /// Why it is none after all.
     failed: Option<Problem>,
 }
 
 /// Time spent in the stages of an answer, for `Server-Timing`.
 #[derive(Clone, Debug, Default)]
-pub struct Stages(pub Vec<(&'static str, Duration)>);
+pub struct Stages(pub Vec<(Cow<'static, str>, Duration)>);
 
 impl Answer {
     fn new(media_type: &'static str, hash: Hash, keep: Keep, body: Body) -> Self {
@@ -68,7 +69,7 @@ impl Answer {
             status: StatusCode::OK,
             headers,
             body,
-            stages: Vec::new(),
+            stages: Stages::default(),
             failed: None,
         }
     }
@@ -141,8 +142,8 @@ impl Answer {
 
     /// With the time that a stage took.
     #[must_use]
-    pub fn stage(mut self, name: &'static str, time: Duration) -> Self {
-        self.stages.push((name, time));
+    pub fn stage(mut self, name: impl Into<Cow<'static, str>>, time: Duration) -> Self {
+        self.stages.0.push((name.into(), time));
         self
     }
 }
@@ -162,8 +163,8 @@ impl IntoResponse for Answer {
         let mut response = HttpResponse::new(self.body);
         *response.status_mut() = self.status;
         *response.headers_mut() = self.headers;
-        if !self.stages.is_empty() {
-            response.extensions_mut().insert(Stages(self.stages));
+        if !self.stages.0.is_empty() {
+            response.extensions_mut().insert(self.stages);
         }
         response
     }

@@ -43,7 +43,7 @@ pub async fn envelope(State(app): State<App>, request: Request, next: Next) -> R
         .remove::<Stages>()
         .unwrap_or_default();
     let mut timing = String::with_capacity(64);
-    for (name, time) in stages.0.into_iter().chain([("total", time)]) {
+    for (name, time) in stages.0.into_iter().chain([("total".into(), time)]) {
         let separator = if timing.is_empty() { "" } else { ", " };
         let _ = write!(
             timing,

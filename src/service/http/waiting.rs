@@ -94,6 +94,7 @@ impl Prefer {
         let waited = begun.elapsed();
         // Who does not wait gets the job, however far it came meanwhile.
         let at_once = self.wait == Some(Duration::ZERO);
+        let stages = job.stages.clone();
         let answer = match job.state {
             _ if at_once => accepted(job, picked),
             JobState::Done => made().await?.status(StatusCode::CREATED).location(address),
@@ -111,6 +112,11 @@ impl Prefer {
             }
             JobState::Queued | JobState::Running => accepted(job, picked),
         };
+        // Those of the job itself, as far as it has come, beside what its caller waited.
+        let answer = stages.into_iter().fold(answer, |answer, over| {
+            let time = Duration::try_from_secs_f64(over.seconds).unwrap_or_default();
+            answer.stage(over.stage, time)
+        });
         let answer = answer.stage("job", waited);
         let applied = match self.wait {
             None => return Ok(answer.into_response()),

@@ -1,13 +1,16 @@
-//! What requests for several resources ask for in the same words: accuracy, targets, weights, views, pages.
+//! What requests for several resources ask for in the same words: accuracy, targets, a paint or a blend, weights,
+//! views, pages.
 //!
 //! Promised: a refusal names the parameter or the field and what would be accepted. Left to others: what it means
 //! (`accuracy`, `blend`), and what is done with it (`resources`).
 
+mod named;
 pub mod page;
 mod profile;
 pub mod targets;
 pub mod view;
 mod weights;
 
+pub use named::{Named, of_field};
 pub use profile::{KnobsDocument, ProfileDocument, ProfileText};
 pub use weights::WeightQuery;

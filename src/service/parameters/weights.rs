@@ -62,6 +62,35 @@ impl WeightQuery {
         }
     }
 
+    /// The same with as much of each of these paints, where the weights of the whole are not given.
+    #[must_use]
+    pub fn or_even(mut self, names: &[String]) -> Self {
+        if self.weights.is_none() && self.greek().iter().all(Option::is_none) {
+            self.weights = Some(vec![1.0 / names.len() as f64; names.len()]);
+        }
+        self
+    }
+
+    const fn greek(&self) -> [Option<f64>; 5] {
+        [self.alpha, self.beta, self.gamma, self.delta, self.epsilon]
+    }
+
+    /// The first field that is given.
+    #[must_use]
+    pub fn first_given(&self) -> Option<&'static str> {
+        let greek = self.greek().map(|weight| weight.is_some());
+        let greek = GREEK.into_iter().zip(greek);
+        let others = [
+            ("weights", self.weights.is_some()),
+            ("base", self.base.is_some()),
+            ("flake_lightness", self.flake_lightness.is_some()),
+            ("flake_color", self.flake_color.is_some()),
+            ("flake_saturation", self.flake_saturation.is_some()),
+        ];
+        let mut fields = others.into_iter().chain(greek);
+        fields.find_map(|(field, is)| is.then_some(field))
+    }
+
     /// The weights for a blend of these paints.
     ///
     /// # Errors
@@ -103,7 +132,7 @@ impl WeightQuery {
     }
 
     fn weights(&self, names: &[String]) -> Result<Option<Vec<f64>>, Problem> {
-        let greek = [self.alpha, self.beta, self.gamma, self.delta, self.epsilon];
+        let greek = self.greek();
         if let Some(list) = &self.weights {
             return match greek.iter().position(Option::is_some) {
                 Some(k) => {

@@ -10,8 +10,8 @@ use utoipa::IntoParams;
 use crate::service::app::App;
 use crate::service::http::{Address, Answer, BlendProblems, Problem, Query};
 use crate::service::ids;
-use crate::service::parameters::ProfileText;
-use crate::service::work::WorkError;
+use crate::service::parameters::{ProfileText, targets};
+use crate::service::work::{Asked, WorkError};
 
 /// How accurately a bundle is written.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -20,6 +20,12 @@ pub struct BundleQuery {
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,precision=f32`.
     #[param(value_type = Option<String>, example = "standard")]
     profile: Option<ProfileText>,
+    /// In place of a profile: the cheapest whose error is at most this, Lab.
+    #[param(exclusive_minimum = 0.0)]
+    max_error: Option<f64>,
+    /// In place of a profile: the most accurate that is done in so many seconds here.
+    #[param(exclusive_minimum = 0.0)]
+    max_seconds: Option<f64>,
 }
 
 /// All paints of a blend in one archive.
@@ -42,11 +48,31 @@ pub async fn bundle(
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let blend = app.blend(&id).await?;
+    let target = targets::of_query(query.max_error, query.max_seconds, query.profile.is_some())?;
     let asked = query.profile.unwrap_or_default();
     asked.fits(&blend)?;
-    let profile = asked.of_query()?;
+    let mut profile = asked.of_query()?;
+    let mut picked = None;
+    if target.is_some() {
+        let whole = ("bundle", &blend.id, blend.file, target);
+        let (works, blend) = (Arc::clone(&app.works), Arc::clone(&blend));
+        let found = app.pick(&whole, move || {
+            let asked = Asked::Bundle {
+                thing: &blend.thing,
+            };
+            works.pick(&asked, &target).map_err(WorkError::of_query)
+        });
+        let found = found.await?;
+        profile = *found.profile();
+        picked = Some(found);
+    }
     let key = ids::result("blend_bundle", &(&blend.id, blend.file, profile.export));
-    let (name, keep) = (format!("{}.zip", blend.id), blend.keep());
+    let name = format!("{}.zip", blend.id);
+    // What a target picks may change with the machine's load.
+    let keep = match picked {
+        Some(_) => blend.keep().revalidated(),
+        None => blend.keep(),
+    };
     let on = app.clone();
     let compute = move || async move {
         let (works, counter) = (
@@ -63,5 +89,7 @@ pub async fn bundle(
     };
     let result = app.results.get_or_compute(key, compute).await?;
     let answer = Answer::result("application/zip", result, keep).saved_as(&name);
-    Ok(answer.stage("bundle", begun.elapsed()))
+    Ok(answer
+        .picked(picked.as_ref())
+        .stage("bundle", begun.elapsed()))
 }

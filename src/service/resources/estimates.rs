@@ -1,86 +1,29 @@
 //! Estimates: what a request will take and how accurate it will be, before it is made.
 
+mod order;
+
 use std::sync::Arc;
 
 use axum::extract::State;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
+pub use self::order::EstimateOrder;
+use self::order::WorkName;
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::PaintFile;
 use crate::service::app::App;
 use crate::service::environments::Unread;
 use crate::service::http::{Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument, Problems};
-use crate::service::parameters::view::{self, Names, Side};
-use crate::service::parameters::{ProfileDocument, ProfileText, WeightQuery, targets};
+use crate::service::parameters::{of_field, targets};
 use crate::service::shelf::Shelved;
 use crate::service::work::{
-    Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, Shape, Show, View, WorkError,
+    Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, View, WorkError,
 };
 use crate::store::LocalBlob;
 use crate::workshop::Environment;
-
-/// Work to estimate.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct EstimateOrder {
-    /// `ingest` (again, of a paint that was uploaded as a measurement), `blend`, `realise` or `preview`.
-    work: WorkName,
-    /// Id of the paint to ingest again, or to write or draw.
-    paint: Option<String>,
-    /// Id of the blend to write or draw.
-    blend: Option<String>,
-    /// Ids of the paints to blend.
-    paints: Option<Vec<String>>,
-    /// Weights of a blend, in the order of its paints; even unless given.
-    weights: Option<Vec<f64>>,
-    /// Weights of coat, diffuse, lobes and color table alone.
-    base: Option<Vec<f64>>,
-    /// Weights of the flakes' lightness, grain and lifetime alone.
-    flake_lightness: Option<Vec<f64>>,
-    /// Weights of the flakes' color alone.
-    flake_color: Option<Vec<f64>>,
-    /// Factor on the flakes' color.
-    flake_saturation: Option<f64>,
-    /// File to write, `zip` unless given.
-    format: Option<Format>,
-    /// What the paint is on, `sphere` unless given.
-    scene: Option<Shape>,
-    /// Pixels across and down of a picture, 512 each unless given.
-    #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
-    size: Option<[u32; 2]>,
-    /// What a picture shows, `paint` unless given. `aspecular` takes neither `profile` nor `max_error` nor `max_seconds`.
-    show: Option<Show>,
-    /// Panorama that lights a picture, the id of an answer to `POST /v1/environments`; `studio`, the built-in one, unless
-    /// given.
-    #[schema(pattern = "^(studio|e_[0-9a-f]{32})$")]
-    environment: Option<String>,
-    /// Accuracy: the name of a preset, or an object of knobs.
-    #[schema(value_type = Option<ProfileDocument>)]
-    profile: Option<ProfileText>,
-    /// In place of a profile: the cheapest whose error is at most this.
-    #[schema(exclusive_minimum = 0.0)]
-    max_error: Option<f64>,
-    /// In place of a profile: the most accurate that is done in so many seconds here.
-    #[schema(exclusive_minimum = 0.0)]
-    max_seconds: Option<f64>,
-}
-
-/// Kinds of work.
-#[derive(Clone, Copy, Debug, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum WorkName {
-    /// A measurement becomes a paint.
-    Ingest,
-    /// Paints become a blend.
-    Blend,
-    /// A paint or blend becomes a file.
-    Realise,
-    /// A paint or blend becomes a picture.
-    Preview,
-}
 
 /// What a request will take.
 #[derive(Debug, Serialize, ToSchema)]
@@ -109,20 +52,9 @@ pub struct EstimateDocument {
 enum Needed {
     Ingest(LocalBlob, Box<IngestOrder>),
     Blend(Vec<Arc<Shelved>>),
-    Realise(Arc<Shelved>, Option<RealisationWeights>),
+    Realise(Arc<Shelved>, Option<RealisationWeights>, Format),
+    Bundle(Arc<Shelved>),
     Preview(Box<Picture>),
-}
-
-impl Needed {
-    /// The paints or the blend whose clusters are as they are.
-    fn things(&self) -> &[Arc<Shelved>] {
-        match self {
-            Self::Ingest(..) => &[],
-            Self::Blend(paints) => paints,
-            Self::Realise(of, _) => std::slice::from_ref(of),
-            Self::Preview(picture) => std::slice::from_ref(&picture.of),
-        }
-    }
 }
 
 /// A picture to estimate.
@@ -154,7 +86,7 @@ pub async fn create(
     let target = targets::of_body(order.max_error, order.max_seconds, order.profile.is_some())?;
     let profile = order.profile.clone().unwrap_or_default().of_body()?;
     order.refuse_beside_the_point()?;
-    let needed = order.needed(&app, &profile).await?;
+    let needed = Needed::of(&order, &app, &profile).await?;
     if let Some(asked) = &order.profile {
         for thing in needed.things() {
             asked.fits(thing).map_err(Problem::in_body)?;
@@ -184,12 +116,8 @@ pub async fn create(
                 works.estimate(asked, &profile).map(|made| (made, None))
             }
         };
-        let environment = match &needed {
-            Needed::Preview(picture) => picture.unread.as_ref().map(Unread::read),
-            _ => None,
-        };
-        let environment = environment.transpose().map_err(Problem::in_body)?;
-        let done = order.with_asked(&needed, environment.as_deref(), estimate);
+        let environment = needed.environment().map_err(Problem::in_body)?;
+        let done = needed.with_asked(environment.as_deref(), estimate);
         done.map_err(told)
     });
     let (estimate, met) = estimated.await??;
@@ -213,109 +141,19 @@ impl EstimateDocument {
     }
 }
 
-impl EstimateOrder {
-    /// A field that the work does not have would be an answer to another question.
-    fn refuse_beside_the_point(&self) -> Result<(), Problem> {
-        let given = [
-            ("paint", self.paint.is_some()),
-            ("blend", self.blend.is_some()),
-            ("paints", self.paints.is_some()),
-            ("weights", self.weights.is_some()),
-            ("base", self.base.is_some()),
-            ("flake_lightness", self.flake_lightness.is_some()),
-            ("flake_color", self.flake_color.is_some()),
-            ("flake_saturation", self.flake_saturation.is_some()),
-            ("format", self.format.is_some()),
-            ("scene", self.scene.is_some()),
-            ("size", self.size.is_some()),
-            ("show", self.show.is_some()),
-            ("environment", self.environment.is_some()),
-        ];
-        let of_blend: &[&str] = &[
-            "blend",
-            "weights",
-            "base",
-            "flake_lightness",
-            "flake_color",
-            "flake_saturation",
-        ];
-        let (work, own): (_, &[&str]) = match self.work {
-            WorkName::Ingest => ("ingest", &["paint"]),
-            WorkName::Blend => ("blend", &["paints"]),
-            WorkName::Realise => ("realise", &["paint", "format"]),
-            WorkName::Preview => (
-                "preview",
-                &["paint", "scene", "size", "show", "environment"],
-            ),
-        };
-        let weighs = matches!(self.work, WorkName::Realise | WorkName::Preview);
-        let (work, taken) = match &self.blend {
-            Some(_) if weighs => (work.to_owned(), [own, of_blend].concat()),
-            None if weighs => (format!("{work}, of a paint,"), own.to_vec()),
-            _ => (work.to_owned(), own.to_vec()),
-        };
-        match given.iter().find(|(name, is)| *is && !taken.contains(name)) {
-            Some((name, _)) => Err(Problem::value(
-                format!("/{name}"),
-                format!("The work {work} takes no {name}."),
-            )
-            .accepting(taken.join(", "))),
-            None => Ok(()),
-        }
-    }
-
-    /// What a picture of it shows, by the checks of a picture.
-    async fn view(&self, app: &App, profile: &Profile) -> Result<View, Problem> {
-        let show = self.show.unwrap_or_default();
-        let sampled = [
-            ("profile", self.profile.is_some()),
-            ("max_error", self.max_error.is_some()),
-            ("max_seconds", self.max_seconds.is_some()),
-        ];
-        view::refuse_samples_of_angles(show, &sampled, &Names::BODY)?;
-        let environment = view::environment(app, self.environment.as_deref(), &Names::BODY);
-        let asked = View {
-            show,
-            scene: self.scene.unwrap_or_default(),
-            size: self.size.unwrap_or([512; 2]),
-            samples_per_pixel: view::samples(show, None, profile),
-            environment: environment.await?,
-            lights: None,
-        };
-        view::view(app, asked, &Names::BODY)
-    }
-
-    async fn needed(&self, app: &App, profile: &Profile) -> Result<Needed, Problem> {
-        match self.work {
+impl Needed {
+    /// Finds what an order names.
+    async fn of(order: &EstimateOrder, app: &App, profile: &Profile) -> Result<Self, Problem> {
+        match order.work {
             WorkName::Ingest => {
-                let id = self.paint.as_deref();
+                let id = order.paint.as_deref();
                 let id = id.ok_or_else(|| missing("paint").accepting("the id of a paint"))?;
-                let paint = of_field(app.paint(id).await, "/paint")?;
-                let none = || {
-                    Problem::new(
-                        Kind::NoMeasurement,
-                        "This paint was not uploaded as a measurement.",
-                    )
-                };
-                let upload = paint.measurement.ok_or_else(none)?;
-                let local = app.blobs.local(upload).await?;
-                let gone = || Problem::internal(format!("upload {upload} is not there"));
-                let layout = paint
-                    .file_of_paint()
-                    .and_then(|file| Layout::by_name(&file.provenance.source));
-                // Of several paints in one document the name took this one.
-                let order = IngestOrder {
-                    name: paint.names.first().cloned(),
-                    layout,
-                    profile: *profile,
-                    ..IngestOrder::default()
-                };
-                Ok(Needed::Ingest(local.ok_or_else(gone)?, Box::new(order)))
+                again(app, id, profile).await
             }
             WorkName::Blend => {
                 let most = app.config.limits.paints;
                 let accepted = format!("2 to {most} ids of paints");
-                let ids = self.paints.as_deref();
+                let ids = order.paints.as_deref();
                 let ids = ids.ok_or_else(|| missing("paints").accepting(&accepted))?;
                 if !(2..=most).contains(&ids.len()) {
                     let detail = format!("{} paints are to be blended.", ids.len());
@@ -323,20 +161,29 @@ impl EstimateOrder {
                 }
                 let mut paints = Vec::with_capacity(ids.len());
                 for (place, id) in ids.iter().enumerate() {
-                    let pointer = format!("/paints/{place}");
-                    paints.push(of_field(app.paint(id).await, &pointer)?);
+                    let field = format!("paints/{place}");
+                    let paint = app.paint(id).await;
+                    paints.push(paint.map_err(|problem| of_field(&field, problem))?);
                 }
-                Ok(Needed::Blend(paints))
+                Ok(Self::Blend(paints))
             }
             WorkName::Realise => {
-                let (of, weights) = self.thing(app).await?;
-                Ok(Needed::Realise(of, weights))
+                let (of, weights) = order.named().find(app).await?;
+                let format = order.format.unwrap_or(Format::Zip);
+                Ok(Self::Realise(of, weights, format))
+            }
+            WorkName::Bundle => {
+                let id = order.blend.as_deref();
+                let id = id.ok_or_else(|| missing("blend").accepting("the id of a blend"))?;
+                let blend = app.blend(id).await;
+                let blend = blend.map_err(|problem| of_field("blend", problem))?;
+                Ok(Self::Bundle(blend))
             }
             WorkName::Preview => {
-                let view = self.view(app, profile).await?;
-                let (of, weights) = self.thing(app).await?;
+                let view = order.view(app, profile).await?;
+                let (of, weights) = order.named().find(app).await?;
                 let unread = app.unread(view.environment.as_deref()).await;
-                Ok(Needed::Preview(Box::new(Picture {
+                Ok(Self::Preview(Box::new(Picture {
                     of,
                     weights,
                     view,
@@ -346,62 +193,48 @@ impl EstimateOrder {
         }
     }
 
-    async fn thing(
-        &self,
-        app: &App,
-    ) -> Result<(Arc<Shelved>, Option<RealisationWeights>), Problem> {
-        match (&self.paint, &self.blend) {
-            (Some(id), None) => {
-                if self.weights.is_some() {
-                    let problem = Problem::value("/weights", "One paint takes no weights.");
-                    return Err(problem.accepting("nothing"));
-                }
-                let paint = of_field(app.paint(id).await, "/paint")?;
-                Ok((paint, None))
-            }
-            (None, Some(id)) => {
-                let blend = of_field(app.blend(id).await, "/blend")?;
-                let weights = self.weights_for(&blend.names)?;
-                Ok((blend, Some(weights)))
-            }
-            _ => Err(missing("paint").accepting("either paint or blend")),
+    /// The paints or the blend whose clusters are as they are.
+    fn things(&self) -> &[Arc<Shelved>] {
+        match self {
+            Self::Ingest(..) => &[],
+            Self::Blend(paints) => paints,
+            Self::Realise(of, ..) | Self::Bundle(of) => std::slice::from_ref(of),
+            Self::Preview(picture) => std::slice::from_ref(&picture.of),
         }
     }
 
-    fn weights_for(&self, names: &[String]) -> Result<RealisationWeights, Problem> {
-        let even = || vec![1.0 / names.len() as f64; names.len()];
-        let asked = WeightQuery::of_lists(
-            Some(self.weights.clone().unwrap_or_else(even)),
-            self.base.clone(),
-            self.flake_lightness.clone(),
-            self.flake_color.clone(),
-            self.flake_saturation,
-        );
-        asked.for_blend(names).map_err(Problem::in_body)
+    /// The light of a picture, where that is not the built-in studio.
+    fn environment(&self) -> Result<Option<Arc<Environment>>, Problem> {
+        match self {
+            Self::Preview(picture) => picture.unread.as_ref().map(Unread::read).transpose(),
+            _ => Ok(None),
+        }
     }
 
     fn with_asked<T>(
         &self,
-        needed: &Needed,
         environment: Option<&Environment>,
         then: impl FnOnce(&Asked<'_>) -> T,
     ) -> T {
-        match needed {
-            Needed::Ingest(local, order) => then(&Asked::Ingest {
+        match self {
+            Self::Ingest(local, order) => then(&Asked::Ingest {
                 upload: local.path(),
                 order,
             }),
-            Needed::Blend(shelved) => {
+            Self::Blend(shelved) => {
                 let paints: Vec<&PaintFile> =
                     shelved.iter().filter_map(|p| p.file_of_paint()).collect();
                 then(&Asked::Blend { paints: &paints })
             }
-            Needed::Realise(shelved, weights) => then(&Asked::Realise {
+            Self::Realise(shelved, weights, format) => then(&Asked::Realise {
                 thing: &shelved.thing,
                 weights: weights.as_ref(),
-                format: self.format.unwrap_or(Format::Zip),
+                format: *format,
             }),
-            Needed::Preview(picture) => then(&Asked::Preview {
+            Self::Bundle(shelved) => then(&Asked::Bundle {
+                thing: &shelved.thing,
+            }),
+            Self::Preview(picture) => then(&Asked::Preview {
                 thing: &picture.of.thing,
                 weights: picture.weights.as_ref(),
                 view: &picture.view,
@@ -412,17 +245,32 @@ impl EstimateOrder {
     }
 }
 
-fn missing(field: &str) -> Problem {
-    Problem::value(format!("/{field}"), format!("{field} is missing."))
+/// The ingest of a paint's measurement once more.
+async fn again(app: &App, id: &str, profile: &Profile) -> Result<Needed, Problem> {
+    let paint = app.paint(id).await;
+    let paint = paint.map_err(|problem| of_field("paint", problem))?;
+    let none = || {
+        Problem::new(
+            Kind::NoMeasurement,
+            "This paint was not uploaded as a measurement.",
+        )
+    };
+    let upload = paint.measurement.ok_or_else(none)?;
+    let local = app.blobs.local(upload).await?;
+    let gone = || Problem::internal(format!("upload {upload} is not there"));
+    let layout = paint
+        .file_of_paint()
+        .and_then(|file| Layout::by_name(&file.provenance.source));
+    // Of several paints in one document the name took this one.
+    let order = IngestOrder {
+        name: paint.names.first().cloned(),
+        layout,
+        profile: *profile,
+        ..IngestOrder::default()
+    };
+    Ok(Needed::Ingest(local.ok_or_else(gone)?, Box::new(order)))
 }
 
-/// A paint or blend that is named in a body: when there is none, the body is wrong.
-fn of_field(found: Result<Arc<Shelved>, Problem>, pointer: &str) -> Result<Arc<Shelved>, Problem> {
-    found.map_err(|problem| match problem.kind() {
-        Kind::UnknownPaint | Kind::UnknownBlend => {
-            Problem::value(pointer.to_owned(), "There is none of this id.")
-                .accepting("an id that was answered before")
-        }
-        _ => problem,
-    })
+fn missing(field: &str) -> Problem {
+    Problem::value(format!("/{field}"), format!("{field} is missing."))
 }

@@ -10,12 +10,12 @@ use utoipa::ToSchema;
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::http::{
-    Address, Answer, BlendProblems, Idempotency, Json, Kind, NoQuery, PaintProblems, Problem,
+    Address, Answer, BlendProblems, Idempotency, Json, NoQuery, PaintProblems, Problem,
     ProblemDocument, Problems, Query, QueryOfTwo,
 };
 use crate::service::ids;
 use crate::service::parameters::view::{self, Side, ViewQuery};
-use crate::service::parameters::{ProfileDocument, ProfileText, WeightQuery, targets};
+use crate::service::parameters::{Named, ProfileDocument, ProfileText, WeightQuery, targets};
 use crate::service::shelf::Shelved;
 use crate::service::work::drawing::{self, Drawn};
 use crate::service::work::{Light, Picked, PictureFormat, Shape, Show, View};
@@ -184,7 +184,7 @@ pub async fn create(
     view::refuse_samples_of_angles(show, &sampled, &view::Names::BODY)?;
     let knobs = order.profile.is_some() || order.samples_per_pixel.is_some();
     let target = targets::of_body(order.max_error, order.max_seconds, knobs)?;
-    let (thing, weights) = order.thing(&app).await?;
+    let (thing, weights) = order.named().find(&app).await?;
     let asked = order.profile.clone().unwrap_or_default();
     asked.fits(&thing).map_err(Problem::in_body)?;
     let profile = asked.of_body()?;
@@ -223,47 +223,18 @@ pub async fn create(
 }
 
 impl PreviewOrder {
-    async fn thing(
-        &self,
-        app: &App,
-    ) -> Result<(Arc<Shelved>, Option<RealisationWeights>), Problem> {
-        let missing = |field: &str, problem: Problem| match problem.kind() {
-            Kind::UnknownPaint | Kind::UnknownBlend => problem.naming_value(field),
-            _ => problem,
-        };
-        match (&self.paint, &self.blend) {
-            (Some(id), None) => {
-                let weights = [
-                    ("weights", &self.weights),
-                    ("base", &self.base),
-                    ("flake_lightness", &self.flake_lightness),
-                    ("flake_color", &self.flake_color),
-                ];
-                let given = weights.iter().find(|(_, list)| list.is_some());
-                let saturation = self.flake_saturation.map(|_| "flake_saturation");
-                if let Some(field) = given.map(|(field, _)| *field).or(saturation) {
-                    let detail = format!("One paint takes no {field}.");
-                    return Err(Problem::value(format!("/{field}"), detail).accepting("nothing"));
-                }
-                let paint = app.paint(id).await.map_err(|p| missing("paint", p))?;
-                Ok((paint, None))
-            }
-            (None, Some(id)) => {
-                let blend = app.blend(id).await.map_err(|p| missing("blend", p))?;
-                let asked = WeightQuery::of_lists(
-                    self.weights.clone(),
-                    self.base.clone(),
-                    self.flake_lightness.clone(),
-                    self.flake_color.clone(),
-                    self.flake_saturation,
-                );
-                let weights = asked.for_blend(&blend.names);
-                Ok((Arc::clone(&blend), Some(weights.map_err(Problem::in_body)?)))
-            }
-            _ => Err(
-                Problem::value("/paint", "Neither or both of paint and blend are given.")
-                    .accepting("the id of a paint, or of a blend"),
+    fn named(&self) -> Named<'_> {
+        Named {
+            paint: self.paint.as_deref(),
+            blend: self.blend.as_deref(),
+            weights: WeightQuery::of_lists(
+                self.weights.clone(),
+                self.base.clone(),
+                self.flake_lightness.clone(),
+                self.flake_color.clone(),
+                self.flake_saturation,
             ),
+            or_even: false,
         }
     }
 }

@@ -49,6 +49,7 @@ pub async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Proble
     for paint in &paints {
         shelved.push(app.paint(paint).await?);
     }
+    under_way.ended("read");
     let (canonical, places) = in_order_of_hashes(&shelved);
     let names: Vec<&str> = canonical.iter().map(|paint| paint.id.as_str()).collect();
     let key = ids::key("blend", &(&names, profile.flakes, profile.blend));
@@ -70,11 +71,14 @@ pub async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Proble
             Err(_) => {}
         }
     };
+    under_way.ended("blend");
     under_way.stage("storing");
     let options =
         serde_json::to_string(&BlendOptions { profile, places }).map_err(Problem::internal)?;
     let keep = || app.keep_blend(id, &paints, &options, file.clone());
-    under_way.insist(app, keep).await
+    let kept = under_way.insist(app, keep).await?;
+    under_way.ended("store");
+    Ok(kept)
 }
 
 async fn correspond(

@@ -52,8 +52,10 @@ pub async fn ingest(
     };
     let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
     let works = Arc::clone(&app.works);
+    let on = Arc::clone(under_way);
     let fitted = under_way.compute(app, "fitting", move |progress| {
-        let fitted = works.ingest(local.path(), &order, progress);
+        let ended = |stage: &'static str| on.ended(stage);
+        let fitted = works.ingest(local.path(), &order, progress, &ended);
         let is_fit = is_paint_file(local.path()).is_ok_and(|as_it_is| !as_it_is);
         // The caller knows the upload, not the file it was kept in.
         let kept_in = local.path().display().to_string();
@@ -73,9 +75,11 @@ pub async fn ingest(
     let held = app.jobs.held.try_acquire();
     let _lane = held.is_err().then_some(lane);
     under_way.stage("storing");
-    under_way
+    let kept = under_way
         .insist(app, || app.keep_paint(id, &written, Some(upload)))
-        .await
+        .await?;
+    under_way.ended("store");
+    Ok(kept)
 }
 
 /// Lets go of the upload of a job that came to nothing, unless that was our own fault.

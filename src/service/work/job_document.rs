@@ -1,11 +1,21 @@
 //! A job as it is told.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::TargetDocument;
 use crate::service::http::ProblemDocument;
-use crate::store::{JobKind, JobRecord, JobState};
+use crate::store::{JobEnd, JobKind, JobRecord, JobState};
+
+/// What a stage of a job took.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StageDocument {
+    /// `waiting` for its turn, and what was done then: of an ingest `open`, `hash`, `base`, `flakes`, `error` (what the
+    /// clusters miss of the pictures), `certificate`; of a blend `read`, `blend`; in the end `store`.
+    pub stage: String,
+    /// Wall time, seconds.
+    pub seconds: f64,
+}
 
 /// A job as it is told.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
@@ -27,6 +37,8 @@ pub struct JobDocument {
     /// Seconds left as far as one can tell, while it runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seconds_left: Option<f32>,
+    /// What the stages that are over took, in their order.
+    pub stages: Vec<StageDocument>,
     /// Address of what was made, when done.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(format = "uri-reference")]
@@ -64,6 +76,9 @@ impl JobDocument {
             }
             .to_owned(),
             seconds_left: None,
+            stages: (job.stages.as_deref())
+                .and_then(|stages| serde_json::from_str(stages).ok())
+                .unwrap_or_default(),
             result: done.then(|| format!("{made}{}", job.subject)),
             target: None,
             problem: job
@@ -75,10 +90,11 @@ impl JobDocument {
 
     /// A job at its end.
     #[must_use]
-    pub fn at_end(job: &JobRecord, state: JobState, problem: Option<ProblemDocument>) -> Self {
+    pub fn at_end(job: &JobRecord, end: JobEnd<'_>) -> Self {
         Self::of(&JobRecord {
-            state,
-            problem: problem.and_then(|problem| serde_json::to_string(&problem).ok()),
+            state: end.state,
+            problem: end.problem.map(str::to_owned),
+            stages: end.stages.map(str::to_owned),
             ..job.clone()
         })
     }

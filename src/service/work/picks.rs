@@ -36,7 +36,7 @@ impl Default for Picks {
     }
 }
 
-/// A target, and what was picked for it.
+/// A target, and what was picked for it; seconds stand in the header `Carpaint-Target`.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct TargetDocument {
     /// What was asked for: `max_error`, `max_seconds` or both.
@@ -49,10 +49,6 @@ pub struct TargetDocument {
     /// Its knobs.
     #[schema(value_type = Object)]
     knobs: Profile,
-    /// Seconds that the work was estimated to take here.
-    seconds: f64,
-    /// Seconds that the search took, which count for `max_seconds`.
-    searched: f64,
     /// Estimated error: `value` and its `unit`, Lab or CIEDE2000.
     #[schema(value_type = Object)]
     error: EstimatedError,
@@ -67,8 +63,6 @@ impl TargetDocument {
             met: picked.met,
             profile: picked.estimate.profile,
             knobs: picked.estimate.knobs,
-            seconds: picked.estimate.seconds,
-            searched: picked.searched,
             error: picked.estimate.error,
         }
     }

@@ -12,14 +12,14 @@ use futures::FutureExt;
 use serde::Serialize;
 use tokio::sync::{Semaphore, watch};
 
-use super::job_document::JobDocument;
+use super::job_document::{JobDocument, StageDocument};
 use super::under_way::UnderWay;
 use super::workbench::{CalledOff, Workbench};
 use super::{blending, ingesting};
 use crate::service::app::App;
 use crate::service::http::{Kind, Problem};
 use crate::service::ids;
-use crate::store::{JobKind, JobRecord, JobState, NewJob, StoreError};
+use crate::store::{JobEnd, JobKind, JobRecord, JobState, NewJob, StoreError};
 
 /// How often a job is begun before it is given up: each time the process died over it.
 const MOST_ATTEMPTS: u32 = 10;
@@ -148,7 +148,7 @@ pub async fn resume(app: &App) -> Result<(), Problem> {
                 Kind::Internal,
                 "The service ended several times over this job.",
             );
-            end(app, &job, JobState::Failed, Some(&given_up)).await?;
+            end(app, &job, JobState::Failed, Some(&given_up), &[]).await?;
         } else {
             start(app, job);
         }
@@ -157,11 +157,7 @@ pub async fn resume(app: &App) -> Result<(), Problem> {
 }
 
 fn start(app: &App, job: JobRecord) {
-    let under_way = Arc::new(UnderWay {
-        told: watch::Sender::new(JobDocument::of(&job)),
-        cancelled: watch::Sender::new(false),
-        job,
-    });
+    let under_way = Arc::new(UnderWay::new(job));
     app.jobs
         .under_way()
         .insert(under_way.job.id.clone(), Arc::clone(&under_way));
@@ -211,6 +207,7 @@ async fn work(app: &App, under_way: &Arc<UnderWay>) -> Result<Option<JobState>, 
     under_way
         .told
         .send_modify(|told| told.state = JobState::Running);
+    under_way.ended("waiting");
     let ended = match job.kind {
         JobKind::Ingest => ingesting::ingest(app, under_way, lane).await?,
         JobKind::Blend => blending::blend(app, under_way).await?,
@@ -229,7 +226,9 @@ async fn end_insisting(
     problem: Option<Problem>,
 ) -> Option<JobDocument> {
     let problem = problem.as_ref();
-    let ended = under_way.insist_though_cancelled(app, || end(app, &under_way.job, state, problem));
+    let stages = under_way.told.borrow().stages.clone();
+    let record = || end(app, &under_way.job, state, problem, &stages);
+    let ended = under_way.insist_though_cancelled(app, record);
     match ended.await {
         Ok(ended) => ended.ok(),
         Err(problem) => {
@@ -249,16 +248,22 @@ async fn end(
     job: &JobRecord,
     state: JobState,
     problem: Option<&Problem>,
+    stages: &[StageDocument],
 ) -> Result<JobDocument, StoreError> {
     let kind = problem.map(Problem::kind);
-    let problem = problem.map(|problem| problem.document(None));
-    let stored = problem.as_ref().map(serde_json::to_string).transpose();
-    let stored = stored.map_err(|error| StoreError::Corrupt {
-        what: "problem",
+    let unwritten = |error: serde_json::Error| StoreError::Corrupt {
+        what: "job's end",
         detail: error.to_string(),
-    })?;
-    let ended = app.catalogue.end_job(&job.id, state, stored.as_deref());
-    if !ended.await? {
+    };
+    let problem = problem.map(|problem| serde_json::to_string(&problem.document(None)));
+    let problem = problem.transpose().map_err(unwritten)?;
+    let stages = serde_json::to_string(stages).map_err(unwritten)?;
+    let ended = JobEnd {
+        state,
+        problem: problem.as_deref(),
+        stages: Some(&stages),
+    };
+    if !app.catalogue.end_job(&job.id, ended).await? {
         // It has an end already; that one counts.
         let there = app.catalogue.job(&job.id).await?;
         let gone = || StoreError::Corrupt {
@@ -275,7 +280,7 @@ async fn end(
         // A problem says in the log what it is about.
         let _ = ingesting::forget_upload(app, job, kind).await;
     }
-    Ok(JobDocument::at_end(job, state, problem))
+    Ok(JobDocument::at_end(job, ended))
 }
 
 /// How a job stands.

@@ -1,13 +1,13 @@
 //! A job under way, as the work that it does sees it.
 
 use std::pin::pin;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 use tokio::sync::watch;
 
-use super::job_document::JobDocument;
+use super::job_document::{JobDocument, StageDocument};
 use super::workbench::{CalledOff, call_off};
 use crate::service::app::App;
 use crate::service::http::Problem;
@@ -24,9 +24,22 @@ pub struct UnderWay {
     pub(super) job: JobRecord,
     pub(super) told: watch::Sender<JobDocument>,
     pub(super) cancelled: watch::Sender<bool>,
+    /// When the stage that goes on began.
+    since: Mutex<Instant>,
 }
 
 impl UnderWay {
+    /// A job that begins to wait for its turn.
+    #[must_use]
+    pub fn new(job: JobRecord) -> Self {
+        Self {
+            told: watch::Sender::new(JobDocument::of(&job)),
+            cancelled: watch::Sender::new(false),
+            since: Mutex::new(Instant::now()),
+            job,
+        }
+    }
+
     /// What it is about.
     #[must_use]
     pub const fn job(&self) -> &JobRecord {
@@ -46,6 +59,20 @@ impl UnderWay {
     pub fn stage(&self, stage: &str) {
         self.told
             .send_modify(|told| stage.clone_into(&mut told.stage));
+    }
+
+    /// Says that what was done since the last such word is over, and what it is called.
+    pub fn ended(&self, stage: &str) {
+        let now = Instant::now();
+        let since = {
+            let mut since = self.since.lock().unwrap_or_else(PoisonError::into_inner);
+            std::mem::replace(&mut *since, now)
+        };
+        let over = StageDocument {
+            stage: stage.to_owned(),
+            seconds: now.duration_since(since).as_secs_f64(),
+        };
+        self.told.send_modify(|told| told.stages.push(over));
     }
 
     /// Whether somebody called the job off.

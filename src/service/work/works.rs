@@ -83,6 +83,11 @@ pub enum Asked<'a> {
         /// What it is written as.
         format: Format,
     },
+    /// All paints of a blend become one texture bundle.
+    Bundle {
+        /// The blend.
+        thing: &'a Thing,
+    },
     /// A paint, or a blend at some weights, becomes a picture.
     Preview {
         /// The paint or blend.
@@ -147,7 +152,7 @@ impl From<NotFinite> for WorkError {
 
 /// The pieces of work.
 pub trait Works: Debug + Send + Sync {
-    /// An upload becomes a paint.
+    /// An upload becomes a paint; `ended` hears of each stage when it is over.
     ///
     /// # Errors
     ///
@@ -157,6 +162,7 @@ pub trait Works: Debug + Send + Sync {
         upload: &Path,
         order: &IngestOrder,
         progress: Progress<'_>,
+        ended: &dyn Fn(&'static str),
     ) -> Result<PaintFile, WorkError>;
 
     /// Paints become a blend.

@@ -80,6 +80,10 @@ impl Workshop {
                 format,
                 written: false,
             }),
+            Asked::Bundle { thing } => then(&Work::Bundle {
+                thing,
+                written: false,
+            }),
             Asked::Preview {
                 thing,
                 weights,
@@ -123,9 +127,10 @@ impl Works for Workshop {
         upload: &Path,
         order: &IngestOrder,
         progress: Progress<'_>,
+        ended: &dyn Fn(&'static str),
     ) -> Result<PaintFile, WorkError> {
         let options = self.options(order);
-        Ok(workshop::ingest_upload(upload, &options, progress)?)
+        Ok(workshop::ingest_upload(upload, &options, progress, ended)?)
     }
 
     fn blend(

@@ -5,7 +5,7 @@ use sqlx::sqlite::SqliteRow;
 
 use super::SqliteCatalogue;
 use crate::store::blobs::Task;
-use crate::store::{JobBook, JobKind, JobRecord, JobState, NewJob, StoreError, Submitted};
+use crate::store::{JobBook, JobEnd, JobKind, JobRecord, JobState, NewJob, StoreError, Submitted};
 
 fn record(row: &SqliteRow) -> Result<JobRecord, StoreError> {
     let (kind, state): (String, String) = (row.try_get("kind")?, row.try_get("state")?);
@@ -22,6 +22,7 @@ fn record(row: &SqliteRow) -> Result<JobRecord, StoreError> {
             .ok_or_else(|| corrupt(format!("its state is {state:?}")))?,
         attempts: row.try_get("attempts")?,
         problem: row.try_get("problem")?,
+        stages: row.try_get("stages")?,
     })
 }
 
@@ -110,20 +111,17 @@ impl JobBook for SqliteCatalogue {
         })
     }
 
-    fn end_job<'a>(
-        &'a self,
-        id: &'a str,
-        state: JobState,
-        problem: Option<&'a str>,
-    ) -> Task<'a, bool> {
+    fn end_job<'a>(&'a self, id: &'a str, end: JobEnd<'a>) -> Task<'a, bool> {
         Box::pin(async move {
-            let ended =
-                sqlx::query("UPDATE jobs SET state = ?, problem = ? WHERE id = ? AND state IN ('queued', 'running')")
-                    .bind(state.word())
-                    .bind(problem)
-                    .bind(id)
-                    .execute(&self.write)
-                    .await?;
+            let ended = sqlx::query(
+                "UPDATE jobs SET state = ?, problem = ?, stages = ? WHERE id = ? AND state IN ('queued', 'running')",
+            )
+            .bind(end.state.word())
+            .bind(end.problem)
+            .bind(end.stages)
+            .bind(id)
+            .execute(&self.write)
+            .await?;
             Ok(ended.rows_affected() == 1)
         })
     }

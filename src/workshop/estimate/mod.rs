@@ -21,7 +21,7 @@ use serde::Serialize;
 pub use blend::{estimate_blend, estimate_blend_of};
 pub use ingest::{estimate_ingest, sample_to_estimate};
 pub use preview::{PictureWork, SmallPictures, estimate_preview};
-pub use realise::estimate_realise;
+pub use realise::{estimate_bundle, estimate_realise};
 pub use work::Work;
 
 use crate::accuracy::Profile;

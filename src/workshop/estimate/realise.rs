@@ -1,4 +1,4 @@
-//! Estimates of a realisation.
+//! Estimates of files: a realisation, or the bundle of a whole blend.
 
 use super::{
     Estimate, EstimatedError, Stage, extrapolated, shortest, step_for, timed, write_seconds,
@@ -6,7 +6,8 @@ use super::{
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
 use crate::paint::{CarPaint, Flakes, PaintFile};
-use crate::workshop::realising::{Format, realise};
+use crate::workshop::bundling::bundle_blend;
+use crate::workshop::realising::{Format, Made, realise};
 use crate::workshop::{Thing, WorkshopError};
 
 /// Angles on an axis of the two samples: writing has a fixed part that small samples say little of.
@@ -27,6 +28,32 @@ pub fn estimate_realise(
     profile: &Profile,
     written: bool,
 ) -> Result<Estimate, WorkshopError> {
+    let make = |sample: &Thing| realise(sample, weights, format, profile);
+    of_file("realise", thing, profile, written, &make)
+}
+
+/// What writing the bundle of a whole blend will take; opening it not included.
+///
+/// # Errors
+///
+/// What [`bundle_blend`] refuses.
+pub fn estimate_bundle(
+    thing: &Thing,
+    profile: &Profile,
+    written: bool,
+) -> Result<Estimate, WorkshopError> {
+    let make = |sample: &Thing| bundle_blend(sample, profile);
+    of_file("bundle", thing, profile, written, &make)
+}
+
+/// What `make` will take on the whole, by what it takes on two samples.
+fn of_file(
+    stage: &'static str,
+    thing: &Thing,
+    profile: &Profile,
+    written: bool,
+    make: &dyn Fn(&Thing) -> Result<Made, WorkshopError>,
+) -> Result<Estimate, WorkshopError> {
     let whole = slices(thing);
     let mut samples = Vec::new();
     let mut first_go = 0.0;
@@ -34,9 +61,9 @@ pub fn estimate_realise(
         let sample = sample_of(thing, wanted);
         if samples.is_empty() {
             // What is made once and kept, such as the tile of random numbers, is made in the first go.
-            first_go = timed(|| realise(&sample, weights, format, profile).map(drop)).0;
+            first_go = timed(|| make(&sample).map(drop)).0;
         }
-        let (seconds, made) = shortest(|| realise(&sample, weights, format, profile));
+        let (seconds, made) = shortest(|| make(&sample));
         samples.push((slices(&sample), seconds, made?));
     }
     let at = |get: &dyn Fn(usize) -> f64| {
@@ -45,7 +72,7 @@ pub fn estimate_realise(
     let bytes = at(&|k| samples[k].2.bytes.len() as f64);
     let once = (first_go - samples[0].1).max(0.0);
     let mut stages = vec![Stage {
-        stage: "realise",
+        stage,
         seconds: once + COLD * at(&|k| samples[k].1),
     }];
     if written {

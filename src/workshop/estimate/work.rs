@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::{
-    Estimate, PictureWork, estimate_blend, estimate_blend_of, estimate_ingest, estimate_preview,
-    estimate_realise,
+    Estimate, PictureWork, estimate_blend, estimate_blend_of, estimate_bundle, estimate_ingest,
+    estimate_preview, estimate_realise,
 };
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
@@ -44,6 +44,13 @@ pub enum Work<'a> {
         /// Whether it is written to disk.
         written: bool,
     },
+    /// All paints of a blend become one texture bundle.
+    Bundle {
+        /// The blend.
+        thing: &'a Thing,
+        /// Whether it is written to disk.
+        written: bool,
+    },
     /// A paint, or a blend at some weights, becomes a picture.
     Preview(PictureWork<'a>),
 }
@@ -67,6 +74,7 @@ impl Work<'_> {
                 format,
                 written,
             } => estimate_realise(thing, weights, format, profile, written),
+            Self::Bundle { thing, written } => estimate_bundle(thing, profile, written),
             Self::Preview(picture) => estimate_preview(&picture, profile),
         }
     }

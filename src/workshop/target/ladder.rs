@@ -68,7 +68,7 @@ pub(super) fn ladder(work: &Work<'_>) -> Vec<Profile> {
             ..
         }
         | Work::Preview(_) => vec![standard],
-        Work::Realise { .. } => [Precision::Eight, Precision::F16, Precision::F32]
+        Work::Realise { .. } | Work::Bundle { .. } => [Precision::Eight, Precision::F16, Precision::F32]
             .into_iter()
             .map(|precision| Profile {
                 export: ExportSettings {
