@@ -1,16 +1,25 @@
 //! The GLB: a ball with a fitted glTF material, and the paint's own statistics beside it.
 //!
-//! Binary glTF 2.0: a JSON chunk and one binary chunk. Viewers see [`GltfMaterial`](super::GltfMaterial) with baked
+//! Binary glTF 2.0: a JSON chunk and one binary chunk. Viewers see [`GltfMaterial`] with baked
 //! flakes; readers that know carpaint find the whole model in the material's `extras.carpaint`, its lists as accessors
 //! by name, and how far material and paint are apart. Checked by the Khronos validator in `tests/browser`.
 
+mod bake;
+mod brdf;
+mod fit;
+mod material;
+mod mesh;
+mod search;
+
 use serde_json::{Map, Value, json};
 
-use super::gltf_bake::{Baked, bake};
-use super::gltf_brdf::{GltfMaterial, dielectric_f0};
-use super::gltf_fit::{LossReport, fit, loss};
-use super::gltf_material::{extras, material_json};
-use super::gltf_mesh::{Mesh, ball};
+use self::bake::{Baked, bake};
+pub use self::brdf::GltfMaterial;
+use self::brdf::dielectric_f0;
+pub use self::fit::LossReport;
+use self::fit::{fit, loss};
+use self::material::{extras, material_json};
+use self::mesh::{Mesh, ball};
 use super::{About, ExportError};
 use crate::color::LinearRgb;
 use crate::paint::{CarPaint, Flakes, RandomTexture, Reflectance};

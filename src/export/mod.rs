@@ -20,12 +20,6 @@ mod draws;
 mod exr_file;
 mod glb;
 mod gloss;
-mod gltf_bake;
-mod gltf_brdf;
-mod gltf_fit;
-mod gltf_material;
-mod gltf_mesh;
-mod gltf_search;
 mod inverse_cdf;
 #[cfg(test)]
 mod made_up;
@@ -41,10 +35,8 @@ pub use blend_bundle::blend_bundle;
 pub use bundle::{bundle, companions_hash};
 pub use clamp::Clamped;
 pub use cxf::CXF_MEDIA_TYPE;
-pub use glb::{glb, glb_and_loss};
+pub use glb::{GltfMaterial, LossReport, glb, glb_and_loss};
 pub use gloss::{Gloss, gloss};
-pub use gltf_brdf::GltfMaterial;
-pub use gltf_fit::LossReport;
 pub use inverse_cdf::{InverseCdf, inverse_cdf};
 pub use material_json::material_json;
 #[cfg(test)]

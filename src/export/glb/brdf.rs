@@ -229,8 +229,9 @@ mod tests {
     /// How the numbers were made stands in the file.
     #[test]
     fn the_khronos_sample_renderer_shades_the_same() {
-        let oracle: Value = serde_json::from_str(include_str!("../../tests/oracle/gltf_brdf.json"))
-            .expect("an oracle of numbers");
+        let oracle: Value =
+            serde_json::from_str(include_str!("../../../tests/oracle/gltf_brdf.json"))
+                .expect("an oracle of numbers");
         let cases = oracle["cases"].as_array().expect("cases");
         assert_eq!(cases.len(), 160);
         for case in cases {

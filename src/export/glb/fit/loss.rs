@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use crate::color::{Lab, LinearRgb, ciede2000};
-use crate::export::gltf_bake::Texels;
-use crate::export::gltf_brdf::{Cosines, GltfMaterial};
+use crate::export::glb::bake::Texels;
+use crate::export::glb::brdf::{Cosines, GltfMaterial};
 use crate::paint::{ASPECULAR_DEG, Chi, Direction, Reflectance, instrument_pairs};
 
 /// How far a GLB's material is from its paint, as the mean of what a viewer shows of its texels.
@@ -28,7 +28,7 @@ pub struct LossReport {
 }
 
 /// CIEDE2000 of a material against a paint; `texels` are those of its textures, to average over.
-pub(in crate::export) fn loss(
+pub(in crate::export::glb) fn loss(
     material: &GltfMaterial,
     reflectance: &Reflectance<'_>,
     texels: Option<&Texels>,

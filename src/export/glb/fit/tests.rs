@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::color::Lab;
-use crate::export::gltf_brdf::thin_film;
+use crate::export::glb::brdf::thin_film;
 use crate::export::made_up::metallic;
 use crate::paint::{AngleGrid, CarPaint, Coat, ColorTable, Lobe};
 

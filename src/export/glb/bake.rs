@@ -8,10 +8,10 @@
 
 use image::ExtendedColorType;
 
-use super::ExportError;
-use super::gltf_brdf::GltfMaterial;
-use super::png_file::png;
+use super::brdf::GltfMaterial;
 use crate::color::{LinearRgb, decode_srgb, encode_srgb};
+use crate::export::ExportError;
+use crate::export::png_file::png;
 use crate::paint::{
     Chi, Direction, FlakeSampler, Flakes, RandomTexture, Reflectance, TexelDraw, instrument_pairs,
 };
@@ -329,8 +329,8 @@ impl SrgbCurve {
 mod tests {
     use super::*;
     use crate::color::{Lab, ciede2000};
-    use crate::export::gltf_brdf::dielectric_f0;
-    use crate::export::gltf_fit::{fit, loss};
+    use crate::export::glb::brdf::dielectric_f0;
+    use crate::export::glb::fit::{fit, loss};
     use crate::export::made_up::metallic;
 
     /// A texel is what a viewer shows of it: its byte times the factor, at most 1.

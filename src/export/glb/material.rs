@@ -2,11 +2,13 @@
 
 use serde_json::{Map, Value, json};
 
-use super::About;
-use super::gltf_brdf::GltfMaterial;
-use super::gltf_fit::LossReport;
-use super::gltf_mesh::Mesh;
-use super::numbers::{ANGLES, ANY, GRAIN, Number, PAINT, PROVENANCE, REPORT, documentation};
+use super::brdf::GltfMaterial;
+use super::fit::LossReport;
+use super::mesh::Mesh;
+use crate::export::About;
+use crate::export::numbers::{
+    ANGLES, ANY, GRAIN, Number, PAINT, PROVENANCE, REPORT, documentation,
+};
 use crate::paint::{CarPaint, RandomTexture, cell_spacing};
 
 /// The material and the extensions it uses; `textures` are those of F0 and of the normals.

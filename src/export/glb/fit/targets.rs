@@ -2,7 +2,7 @@
 
 use super::loss::reflected;
 use crate::color::{Lab, LinearRgb};
-use crate::export::gltf_brdf::Cosines;
+use crate::export::glb::brdf::Cosines;
 use crate::paint::{Chi, Direction, Reflectance, instrument_pairs};
 
 /// Weight of the pairs beside the instrument's.

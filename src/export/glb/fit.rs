@@ -17,8 +17,8 @@ pub use self::loss::LossReport;
 pub(super) use self::loss::loss;
 use self::loss::reflected;
 use self::targets::{Target, targets};
-use super::gltf_brdf::{GltfMaterial, dielectric_f0};
-use super::gltf_search::{Problem, minimise};
+use super::brdf::{GltfMaterial, dielectric_f0};
+use super::search::{Problem, minimise};
 use crate::color::LinearRgb;
 use crate::paint::Reflectance;
 
@@ -237,7 +237,7 @@ fn split(targets: &[Target], alpha: f64) -> [f64; 6] {
         for t in targets {
             let (d, s) = (
                 std::f64::consts::FRAC_1_PI,
-                super::gltf_brdf::specular(alpha, &t.cosines),
+                super::brdf::specular(alpha, &t.cosines),
             );
             let w = t.weight / (t.color[k].abs() + 1e-3).powf(4.0 / 3.0);
             dd += w * d * d;
