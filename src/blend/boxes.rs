@@ -86,14 +86,6 @@ pub(super) fn reach(paints: &[Boxes]) -> f32 {
 
 /// `Σ_m w_m g_m` for both corners of every cluster into `out`; `weights` are per paint, for L, a and b.
 pub(super) fn mix_boxes(flakes: &BlendedFlakes, weights: &[[f64; 3]], out: &mut Boxes) -> Account {
-    let clusters = flakes.probability.len();
-    for list in [&mut out.lower, &mut out.upper] {
-        if list.capacity() < clusters {
-            *list = vec![[0.0; 3]; clusters];
-        } else {
-            list.resize(clusters, [0.0; 3]);
-        }
-    }
     let largest = |axis: usize| weights.iter().map(|w| w[axis].abs()).sum::<f64>();
     let size = largest(0).max(largest(1)).max(largest(2));
     let farthest = size * f64::from(flakes.reach) * ROUNDING;
@@ -113,6 +105,10 @@ pub(super) fn mix_boxes(flakes: &BlendedFlakes, weights: &[[f64; 3]], out: &mut 
 /// Sums in 64 bits, every number ordered and held.
 fn wide(paints: &[Boxes], weights: &[[f64; 3]], out: &mut Boxes) -> Account {
     let mut account = Account::default();
+    let clusters = paints.first().map_or(0, |own| own.lower.len());
+    for list in [&mut out.lower, &mut out.upper] {
+        list.resize(clusters, [0.0; 3]);
+    }
     for (k, (low, high)) in out.lower.iter_mut().zip(&mut out.upper).enumerate() {
         for axis in 0..3 {
             let mut pair = [0.0; 2];
@@ -149,10 +145,24 @@ fn blocks<const PAINTS: usize>(
     out: &mut Boxes,
 ) -> Account {
     let mut account = Account::default();
-    let (lower, upper) = (out.lower.as_flattened_mut(), out.upper.as_flattened_mut());
-    for first in (0..lower.len()).step_by(BLOCK) {
-        let here = first..(first + BLOCK).min(lower.len());
-        let (low, high) = (&mut lower[here.clone()], &mut upper[here.clone()]);
+    let clusters = paints[0].lower.len();
+    // New memory is not cleared first, which would cost half as much again: blocks are summed in the nearest cache and
+    // appended.
+    let in_place = [&out.lower, &out.upper].map(|list| list.len()) == [clusters; 2];
+    if !in_place {
+        for list in [&mut out.lower, &mut out.upper] {
+            list.clear();
+            list.reserve_exact(clusters);
+        }
+    }
+    let mut new = [[0.0; BLOCK]; 2];
+    for first in (0..3 * clusters).step_by(BLOCK) {
+        let here = first..(first + BLOCK).min(3 * clusters);
+        let [low, high] = if in_place {
+            [&mut out.lower, &mut out.upper].map(|list| &mut list.as_flattened_mut()[here.clone()])
+        } else {
+            new.each_mut().map(|block| &mut block[..here.len()])
+        };
         let [lower, upper] = [
             paints.map(|own| &own.lower.as_flattened()[here.clone()]),
             paints.map(|own| &own.upper.as_flattened()[here.clone()]),
@@ -168,6 +178,11 @@ fn blocks<const PAINTS: usize>(
             }
         } else if !ordered {
             account.put_in_order(low, high);
+        }
+        if !in_place {
+            for (list, block) in [&mut out.lower, &mut out.upper].into_iter().zip(&new) {
+                list.extend_from_slice(block[..here.len()].as_chunks().0);
+            }
         }
     }
     account
