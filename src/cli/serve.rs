@@ -116,6 +116,7 @@ async fn load(
     failed: Arc<Notify>,
 ) -> Result<(), WorkshopError> {
     let loaded = async {
+        service::calibrate(&app).await;
         let whole = no_samples
             || service::load_samples(&app)
                 .await

@@ -10,12 +10,14 @@
 //! | `app` | what all handlers share: the store, the work, the counts |
 //! | `shelf`, `keeping`, `uploading` | paints and blends as they are read, kept and removed, and uploads until they are named |
 //! | `environments` | environments as pictures are lit with them |
+//! | `calibration` | what this machine takes, learned before anybody asks |
 //!
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
 //! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`),
 //! who calls: whoever reaches the service may do all it does, and what is private is only left out of lists.
 
 mod app;
+mod calibration;
 mod environments;
 mod http;
 mod ids;
@@ -30,6 +32,7 @@ mod uploading;
 mod work;
 
 pub use app::App;
+pub use calibration::calibrate;
 pub use http::Origin;
 pub use resources::docs::interface;
 pub use samples::load_samples;

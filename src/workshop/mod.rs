@@ -28,7 +28,10 @@ pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};
 pub use error::{Fault, Inside, WorkshopError, accepted};
-pub use estimate::{Estimate, EstimatedError, PictureWork, Stage, Work, sample_to_estimate};
+pub use estimate::{
+    Estimate, EstimatedError, PictureWork, Stage, Work, known_machine, sample_to_estimate,
+    this_machine,
+};
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{
     BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, ReadingsUpload, check_clusters,

@@ -30,7 +30,7 @@ pub struct Point {
 /// Error against time of one kind of work.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Front {
-    /// `ingest`, `blend`, `realise` or `preview`.
+    /// `ingest`, `blend`, `join`, `realise` or `preview`.
     pub work: String,
     /// What the work is, for people.
     pub about: String,

@@ -6,11 +6,13 @@
 
 mod front;
 mod growth;
+mod machine;
 mod page;
 mod plot;
 
 pub use front::{Front, Point};
 pub use growth::Growth;
+pub use machine::Machine;
 pub use page::page;
 pub use plot::plots;
 
@@ -35,6 +37,9 @@ pub struct Study {
     pub quick: bool,
     /// Seconds that the study took.
     pub seconds: f64,
+    /// What this machine takes for steps that depend on it alone; the cost model of estimates takes it from here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub machine: Option<Machine>,
     /// Error against time, one for each kind of work.
     pub fronts: Vec<Front>,
     /// Time against size.

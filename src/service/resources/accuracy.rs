@@ -3,6 +3,7 @@
 use axum::extract::State;
 
 use crate::service::app::App;
+use crate::service::calibration::STUDY;
 use crate::service::http::{Answer, Keep, NoQuery, Problem, Problems};
 
 /// The study that ships with the program.
@@ -19,7 +20,7 @@ const SHIPPED: &str = include_str!("../../../docs/study/study.json");
     )
 )]
 pub async fn show(State(app): State<App>, _: NoQuery) -> Result<Answer, Problem> {
-    let own = app.config.data.join("study.json");
+    let own = app.config.data.join(STUDY);
     let study = match tokio::fs::read(&own).await {
         Ok(bytes) if serde_json::from_slice::<serde_json::Value>(&bytes).is_ok() => bytes,
         Ok(_) => {

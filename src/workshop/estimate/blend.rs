@@ -2,8 +2,7 @@
 
 use super::ingest::{Sampled, of_paint, sample};
 use super::{
-    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, shortest, timed,
-    write_seconds,
+    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, shortest, this_machine, timed,
 };
 use crate::accuracy::{Profile, blend_error};
 use crate::blend::Blend;
@@ -107,7 +106,7 @@ fn of_samples(
     if written {
         stages.push(Stage {
             stage: "write",
-            seconds: at(encode_small, encode_large) + write_seconds(bytes),
+            seconds: at(encode_small, encode_large) + this_machine().write_seconds(bytes),
         });
     }
     let error = EstimatedError::lab(blend_error(&large.1).lab);

@@ -1,27 +1,21 @@
 //! Estimates of an ingest, and samples of paints that are still to be ingested.
 
-use std::io::Read as _;
 use std::path::Path;
 
+use super::machine::stand_in;
 use super::{
-    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, left_at, shortest, step_for,
-    timed, write_seconds,
+    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, left_at, step_for,
+    this_machine, timed, write_stage,
 };
 use crate::accuracy::{
     Profile, clustering_error, left_out_w1, paint_error, predicted_clustering_error,
 };
 use crate::fit::{ClusterSettings, FittedFlakes, Thinned, fit_flakes};
 use crate::measurement::{FlakePictures, PackageBase};
-use crate::paint::{
-    CarPaint, Chi, Clustering, ColorTable, Lobe, PaintFile, Provenance, Reflectance, certify,
-    instrument_pairs,
-};
+use crate::paint::{CarPaint, Clustering, PaintFile, Provenance, certify};
 use crate::workshop::ingest::finish;
 use crate::workshop::thing::{Source, Thing, find, open};
 use crate::workshop::{IngestOptions, Measurement, WorkshopError, open_measurement};
-
-/// Evaluations of a paint that fitting a reflectance table takes as long as.
-const EVALUATIONS_OF_A_FIT: f64 = 1.0e7;
 
 /// A paint that may be still to be ingested, with a few of its angles.
 pub(super) struct Sampled {
@@ -51,10 +45,7 @@ pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, 
     let [small, large] = &sampled.paints;
     let bytes = extrapolated(size(small)?, size(large)?, whole);
     let mut stages = sampled.stages;
-    stages.push(Stage {
-        stage: "write",
-        seconds: write_seconds(bytes),
-    });
+    stages.push(write_stage(bytes));
     let error = EstimatedError::lab(paint_error(large).lab);
     Ok(Estimate::new(&options.profile, stages, bytes, error))
 }
@@ -300,24 +291,6 @@ fn fitted(
     Ok((paints, angles))
 }
 
-/// A paint of one color, where only the size of a paint matters.
-fn stand_in() -> CarPaint {
-    CarPaint {
-        coat: None,
-        diffuse: [0.2; 3],
-        lobes: vec![
-            Lobe {
-                weight: [0.05; 3],
-                alpha: 0.3,
-                f0: 0.5,
-            };
-            3
-        ],
-        color_table: ColorTable::white(),
-        flakes: None,
-    }
-}
-
 fn finished(name: &str, paint: CarPaint, clustering: Option<Clustering>) -> PaintFile {
     let nothing = Vec::new();
     finish(
@@ -330,39 +303,19 @@ fn finished(name: &str, paint: CarPaint, clustering: Option<Clustering>) -> Pain
     )
 }
 
-/// What hashing a package takes, by the first part of it.
+/// What reading and hashing a package takes.
 fn hash_stage(path: &Path) -> Stage {
-    const PART: u64 = 4 << 20;
     let length = std::fs::metadata(path).map_or(0, |about| about.len());
-    let (seconds, hashed) = timed(|| -> std::io::Result<u64> {
-        let mut hasher = blake3::Hasher::new();
-        hasher.update_reader(std::fs::File::open(path)?.take(PART))?;
-        Ok(hasher.count())
-    });
-    // Of a folder's files none was read.
-    let part = hashed.unwrap_or(0).max(1) as f64;
     Stage {
         stage: "hash",
-        seconds: seconds * (length as f64 / part).max(1.0),
+        seconds: this_machine().hash_seconds(length as f64),
     }
 }
 
 /// What fitting a reflectance table takes.
 fn fit_stage() -> Stage {
-    const EVALUATIONS: u32 = 100_000;
-    let paint = stand_in();
-    let reflectance = Reflectance::new(&paint);
-    let pairs = instrument_pairs();
-    let (seconds, _) = shortest(|| {
-        (0..EVALUATIONS)
-            .map(|k| {
-                let (wi, wo) = pairs[k as usize % pairs.len()];
-                reflectance.evaluate(wi, wo, Chi::Table)[1]
-            })
-            .sum::<f64>()
-    });
     Stage {
         stage: "fit",
-        seconds: seconds * EVALUATIONS_OF_A_FIT / f64::from(EVALUATIONS),
+        seconds: this_machine().fit_seconds(),
     }
 }

@@ -3,13 +3,15 @@
 //! A request is estimated by doing a small part of it on this machine, now: every k-th angle of the very paints, a few
 //! pixels of the very picture. Time and bytes of two such samples, one larger than the other, give what is fixed and what
 //! grows with the work; the error is measured on the larger sample. A sample takes a few hundredths of the time of the
-//! whole, and as it runs under the same load, the estimate is of this machine as it is. Only the fit of a bare
-//! reflectance table cannot be done in part: it costs as much as a number of evaluations of a paint, which are timed.
+//! whole, and as it runs under the same load, the estimate is of this machine as it is. What cannot be done in part is
+//! reckoned from what a [machine](this_machine) was calibrated to take: writing to the disk, hashing, and the fit of a bare reflectance table, which
+//! costs as much as a number of evaluations of a paint.
 //!
 //! Results never depend on an estimate; what is picked for a time limit does.
 
 mod blend;
 mod ingest;
+mod machine;
 mod preview;
 mod realise;
 mod work;
@@ -20,6 +22,7 @@ use serde::Serialize;
 
 pub use blend::{estimate_blend, estimate_blend_of};
 pub use ingest::{estimate_ingest, sample_to_estimate};
+pub use machine::{known_machine, study_machine, this_machine};
 pub use preview::{PictureWork, SmallPictures, estimate_preview};
 pub use realise::{estimate_bundle, estimate_realise};
 pub use work::Work;
@@ -117,6 +120,14 @@ fn left_at(angles: usize, step: usize) -> usize {
     (angles - 1).div_ceil(step) + 1
 }
 
+/// Writing a result of this size to disk.
+fn write_stage(bytes: f64) -> Stage {
+    Stage {
+        stage: "write",
+        seconds: this_machine().write_seconds(bytes),
+    }
+}
+
 /// Seconds that something takes, and what it gives.
 fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let begun = Instant::now();
@@ -149,37 +160,6 @@ fn extrapolated(small: (f64, f64), large: (f64, f64), size: f64) -> f64 {
         return large.1 / large.0.max(1.0) * size;
     }
     fixed + per_unit * size
-}
-
-/// The middle of three goes: what work takes that waits for a disk.
-fn usual<T>(mut work: impl FnMut() -> T) -> f64 {
-    let mut goes = [(); 3].map(|()| timed(&mut work).0);
-    goes.sort_by(f64::total_cmp);
-    goes[1]
-}
-
-/// Seconds that writing a file of this size durably takes, by writing a small and a larger one as files are written:
-/// beside their place, synced, renamed, and the folder synced.
-fn write_seconds(bytes: f64) -> f64 {
-    use std::io::Write as _;
-    const SMALL: u16 = 1 << 12;
-    const LARGE: u32 = 1 << 20;
-    let write = |length: usize| {
-        let content = vec![0x5a_u8; length];
-        usual(|| -> std::io::Result<()> {
-            let folder = tempfile::tempdir()?;
-            let mut file = tempfile::NamedTempFile::new_in(folder.path())?;
-            file.write_all(&content)?;
-            file.as_file().sync_all()?;
-            file.persist(folder.path().join("whole"))?;
-            std::fs::File::open(folder.path())?.sync_all()
-        })
-    };
-    extrapolated(
-        (f64::from(SMALL), write(usize::from(SMALL))),
-        (f64::from(LARGE), write(LARGE as usize)),
-        bytes,
-    )
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Estimates of a picture.
 
-use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, timed, write_seconds};
+use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, timed, write_stage};
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::Limits;
@@ -82,10 +82,7 @@ impl SmallPictures {
             seconds,
         }];
         if work.written {
-            stages.push(Stage {
-                stage: "write",
-                seconds: write_seconds(bytes),
-            });
+            stages.push(write_stage(bytes));
         }
         let error = EstimatedError {
             value: error,

@@ -1,7 +1,7 @@
 //! Estimates of files: a realisation, or the bundle of a whole blend.
 
 use super::{
-    Estimate, EstimatedError, Stage, extrapolated, shortest, step_for, timed, write_seconds,
+    Estimate, EstimatedError, Stage, extrapolated, shortest, step_for, timed, write_stage,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
@@ -76,10 +76,7 @@ fn of_file(
         seconds: once + COLD * at(&|k| samples[k].1),
     }];
     if written {
-        stages.push(Stage {
-            stage: "write",
-            seconds: write_seconds(bytes),
-        });
+        stages.push(write_stage(bytes));
     }
     let report = &samples[1].2.report;
     let error = report.pointer("/accuracy/error/lab");

@@ -1,7 +1,8 @@
-//! Error against time of the four kinds of work.
+//! Error against time of the kinds of work.
 
 mod blend;
 mod ingest;
+mod join;
 mod preview;
 mod realise;
 
@@ -9,6 +10,7 @@ use std::collections::BTreeMap;
 
 pub(super) use self::blend::blend;
 pub(super) use self::ingest::ingest;
+pub(super) use self::join::join;
 pub(super) use self::preview::preview;
 pub(super) use self::realise::realise;
 use super::material::clustered;

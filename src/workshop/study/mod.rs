@@ -14,6 +14,7 @@ use std::time::Instant;
 pub use material::Material;
 
 use super::WorkshopError;
+use super::estimate::study_machine;
 use crate::accuracy::study::Study;
 
 /// How thorough a study is.
@@ -40,6 +41,7 @@ pub fn study(
     let mut material = Material::open(names)?;
     let ingest = fronts::ingest(&mut material, options, tell)?;
     let blend = fronts::blend(&mut material, options, tell)?;
+    let join = fronts::join(&mut material, options, tell)?;
     let realise = fronts::realise(&mut material, options, tell)?;
     let preview = fronts::preview(&mut material, options, tell)?;
     let growth = growth::measure(&mut material, options, tell)?;
@@ -52,7 +54,12 @@ pub fn study(
         paints: material.names(),
         quick: options.quick,
         seconds: begun.elapsed().as_secs_f64(),
-        fronts: vec![ingest, blend, realise, preview],
+        machine: Some(study_machine()),
+        fronts: [ingest, blend]
+            .into_iter()
+            .chain(join)
+            .chain([realise, preview])
+            .collect(),
         growth,
     })
 }

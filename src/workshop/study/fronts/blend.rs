@@ -87,7 +87,7 @@ pub(in crate::workshop::study) fn blend(
     let count = settings.len();
     let (mut points, mut without) = (Vec::with_capacity(count), Vec::new());
     for (k, of) in settings.into_iter().enumerate() {
-        tell("blend", share(k, count, 0.25, 0.5));
+        tell("blend", share(k, count, 0.25, 0.45));
         let paints: Vec<&PaintFile> = material.fitted(&of.profile.flakes, 2)?.iter().collect();
         let slow = matches!(of.profile.blend.method, Method::Sinkhorn { .. });
         let goes = if slow || options.quick { 1 } else { 5 };

@@ -11,6 +11,18 @@ use crate::workshop::study::material::clustered;
 use crate::workshop::study::{Material, StudyOptions, Tell, shortest};
 use crate::workshop::{WorkshopError, blend_paints};
 
+/// Clusters and samples turned together.
+const CLUSTERS_AND_SAMPLES: [(usize, u32); 8] = [
+    (6, 64),
+    (24, 64),
+    (6, 16),
+    (12, 32),
+    (24, 16),
+    (12, 128),
+    (100, 32),
+    (24, 256),
+];
+
 /// A blend at given weights to a picture.
 pub(in crate::workshop::study) fn preview(
     material: &mut Material,
@@ -37,16 +49,21 @@ pub(in crate::workshop::study) fn preview(
             profile,
         ));
     }
-    for n in [6, 24] {
+    for (n, samples_per_pixel) in CLUSTERS_AND_SAMPLES {
+        if options.quick && samples_per_pixel != 64 {
+            continue;
+        }
         let profile = Profile {
-            samples_per_pixel: 64,
+            samples_per_pixel,
             ..with_flakes(clustered(n, BoxRule::Moments, 1))
         };
-        settings.push(setting(
-            format!("{n} clusters, 64 samples"),
-            "clusters",
-            profile,
-        ));
+        let knob = if samples_per_pixel == standard.samples_per_pixel {
+            "clusters"
+        } else {
+            "together"
+        };
+        let label = format!("{n} clusters, {samples_per_pixel} samples");
+        settings.push(setting(label, knob, profile));
     }
     tell("preview", 0.6);
     let reference = Profile {

@@ -2,13 +2,15 @@
 
 use serde_json::Value;
 
-use super::{distinct, point, presets, setting, share, with_clusters};
+use super::{Setting, distinct, point, presets, setting, share, with_clusters};
 use crate::accuracy::Profile;
 use crate::accuracy::study::Front;
 use crate::blend::RealisationWeights;
 use crate::export::{ExportSettings, Precision};
+use crate::fit::BoxRule;
 use crate::paint::PaintFile;
 use crate::workshop::realising::realise as realise_to;
+use crate::workshop::study::material::clustered;
 use crate::workshop::study::{Material, StudyOptions, Tell, shortest};
 use crate::workshop::{Format, Thing, WorkshopError, blend_paints};
 
@@ -38,6 +40,30 @@ fn ways_to_write() -> Vec<(String, &'static str, Precision, bool, bool)> {
     all
 }
 
+/// Clusters, precision and the way to draw turned together.
+fn turned_together() -> impl Iterator<Item = Setting> {
+    let standard = Profile::standard();
+    let ways = || {
+        ways_to_write()
+            .into_iter()
+            .filter(|(_, _, _, alias, inverse_cdf)| *alias && !inverse_cdf)
+    };
+    [12, 24, 100].into_iter().flat_map(move |n| {
+        ways().map(move |(label, _, precision, alias, inverse_cdf)| {
+            let profile = Profile {
+                flakes: clustered(n, BoxRule::Moments, 1),
+                export: ExportSettings {
+                    precision,
+                    alias,
+                    inverse_cdf,
+                },
+                ..standard
+            };
+            setting(format!("{n} clusters, {label}"), "together", profile)
+        })
+    })
+}
+
 /// A blend at given weights to a bundle.
 pub(in crate::workshop::study) fn realise(
     material: &mut Material,
@@ -60,6 +86,9 @@ pub(in crate::workshop::study) fn realise(
         &[12, 24, 100, 200]
     };
     settings.extend(with_clusters(counts));
+    if !options.quick {
+        settings.extend(turned_together());
+    }
     let read = |profile: &Profile| (profile.flakes, profile.blend, profile.export);
     let settings = distinct(settings, read);
     let (count, goes) = (settings.len(), if options.quick { 2 } else { 7 });
