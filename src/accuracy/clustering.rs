@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::geometries::{Geometry, geometries, mixed, slices_at};
+use super::sparkle::lit_from;
 use crate::color::{Lab, LinearRgb, ciede2000, luminance};
 use crate::fit::{ClusterSettings, Clusterer, SliceClusters, Thinned};
 use crate::measurement::{FlakePictures, SliceRoom};
@@ -31,6 +32,8 @@ struct Compared {
     lightness_w1: f64,
     /// Relative errors of mean luminance and sparkle, where the slice is lit.
     relative: Option<[f64; 2]>,
+    /// Shares of pixels and of clusters from each geometry's lightness of lit flakes on.
+    lit: [[f64; 2]; 6],
 }
 
 /// Compares the flakes of a paint with the pictures they were fitted to. `None` for a paint without flakes.
@@ -96,31 +99,37 @@ fn compared(
 ) -> ClusteringError {
     let seen = geometries(paint);
     let slices = slices_to_compare(pictures, &seen);
+    let lit_from = lit_from_on(&seen, grid, fitted);
     let compared: Vec<Compared> = slices
         .into_par_iter()
         .map_init(SliceRoom::default, |room, k| {
             // A picture between the fitted angles may be damaged: it was not asked for.
             pictures.read(k, room).ok()?;
-            compare(pictures, k, room, grid, fitted)
+            compare(pictures, k, room, (grid, fitted), &lit_from)
         })
         .flatten_iter()
         .collect();
     let of = |get: &dyn Fn(&Compared) -> Option<f64>| {
         Percentiles::of(compared.iter().filter_map(get).collect())
     };
-    let mut instrument = [0.0; 6];
-    for (error, geometry) in instrument.iter_mut().zip(&seen) {
+    let [width, height] = pictures.size();
+    #[allow(clippy::cast_precision_loss)] // a count of pixels
+    let one_texel = 1.0 / (width * height).max(1) as f64;
+    let (mut instrument, mut lit) = ([0.0; 6], [0.0; 6]);
+    for (at, geometry) in seen.iter().enumerate() {
         let here = geometry.slices(pictures.theta_h(), pictures.theta_d());
-        let mean = |of: &dyn Fn(&Compared) -> LinearRgb| {
-            mixed(here.iter().filter_map(|&(weight, k)| {
+        let met = || {
+            here.iter().filter_map(|&(weight, k)| {
                 let compared = compared.iter().find(|c| c.slice == k)?;
-                Some((weight, of(compared)))
-            }))
+                Some((weight, compared))
+            })
         };
-        *error = ciede2000(
-            geometry.lab(mean(&|c| c.pixels)),
-            geometry.lab(mean(&|c| c.clusters)),
+        instrument[at] = ciede2000(
+            geometry.lab(mixed(met().map(|(weight, c)| (weight, c.pixels)))),
+            geometry.lab(mixed(met().map(|(weight, c)| (weight, c.clusters)))),
         );
+        let share = |of: usize| met().map(|(weight, c)| weight * c.lit[at][of]).sum::<f64>();
+        lit[at] = (share(1) - share(0)).abs() / share(0).max(one_texel);
     }
     ClusteringError {
         slices: compared.len(),
@@ -129,7 +138,23 @@ fn compared(
         mean_luminance: of(&|c| c.relative.map(|r| r[0])),
         sparkle: of(&|c| c.relative.map(|r| r[1])),
         instrument,
+        lit: Some(lit),
     }
+}
+
+/// The lightness from which on a flake is lit at each geometry, by the clusters that are seen there.
+fn lit_from_on(
+    seen: &[Geometry],
+    [theta_h, theta_d]: [&AngleGrid; 2],
+    fitted: &Fitted<'_>,
+) -> [f64; 6] {
+    let mut all = [f64::INFINITY; 6];
+    for (from, geometry) in all.iter_mut().zip(seen) {
+        let met = geometry.slices(theta_h, theta_d).into_iter();
+        let means = met.filter_map(|(weight, k)| Some((weight, fitted(k)?.mean())));
+        *from = lit_from(geometry, mixed(means));
+    }
+    all
 }
 
 /// θh and θd of a picture, degrees.
@@ -162,8 +187,8 @@ fn compare(
     pictures: &dyn FlakePictures,
     slice: usize,
     room: &SliceRoom,
-    [theta_h, theta_d]: [&AngleGrid; 2],
-    fitted: &Fitted<'_>,
+    ([theta_h, theta_d], fitted): ([&AngleGrid; 2], &Fitted<'_>),
+    lit_from: &[f64; 6],
 ) -> Option<Compared> {
     let [red, green, blue] = room.picture.planes.each_ref();
     let (mut lightness, mut sum) = (Vec::with_capacity(red.len()), [0.0; 3]);
@@ -196,12 +221,19 @@ fn compare(
             (luminance_of(mixture.quantile(SPARKLE)) / sparkle - 1.0).abs(),
         ]
     });
+    let lit = lit_from.map(|from| {
+        let below = lightness.partition_point(|&l| l < from);
+        #[allow(clippy::cast_precision_loss)] // a count of pixels
+        let pixels = (lightness.len() - below) as f64 / lightness.len() as f64;
+        [pixels, mixture.above(from)]
+    });
     Some(Compared {
         slice,
         pixels,
         clusters,
         lightness_w1: mixture.distance_to(&lightness),
         relative,
+        lit,
     })
 }
 
@@ -291,6 +323,19 @@ mod tests {
         assert!(few.lightness_w1.p90 > some.lightness_w1.p90);
         assert!(some.lightness_w1.p90 > many.lightness_w1.p90);
         assert_eq!((few.of, few.slices > 12), (81, true));
+    }
+
+    #[test]
+    fn lit_flakes_are_counted_better_by_more_clusters() {
+        let mean = |clusters| {
+            let error = error_of(&ClusterSettings {
+                clusters,
+                ..ClusterSettings::default()
+            });
+            error.lit.expect("counted").iter().sum::<f64>() / 6.0
+        };
+        let (one, few, many) = (mean(1), mean(8), mean(150));
+        assert!(one > 4.0 * few && one > 4.0 * many, "{one} {few} {many}");
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 use super::clustering::luminance_of;
 use super::geometries::{Geometry, geometries, mixed};
+use super::sparkle::{lit_from, off_by};
 use crate::blend::{
     Blend, BlendDeviation, BlendError, BlendSettings, Ingredient, RealisationWeights,
 };
@@ -52,16 +53,16 @@ pub fn blend_deviation(
         ) else {
             continue;
         };
-        let ((color, top), (best_color, best_top)) =
-            (seen(&geometry, &found), seen(&geometry, &best));
+        let (found, best) = (seen(&geometry, &found), seen(&geometry, &best));
         deviations.push(BlendDeviation {
             aspecular_deg: geometry.aspecular_deg,
-            delta_e_2000: ciede2000(color, best_color),
-            sparkle: if best_top.abs() > 1e-9 {
-                (top / best_top - 1.0).abs()
+            delta_e_2000: ciede2000(found.color, best.color),
+            sparkle: if best.top.abs() > 1e-9 {
+                (found.top / best.top - 1.0).abs()
             } else {
                 0.0
             },
+            lit: off_by(found.lit, best.lit),
         });
     }
     Ok(deviations)
@@ -78,13 +79,30 @@ fn even(
     Ok(blend.realise(&weights).ok().map(|realised| realised.paint))
 }
 
-/// Reading and sparkle of a paint whose only slice is the one here.
-fn seen(geometry: &Geometry, paint: &CarPaint) -> (Lab, f64) {
+/// What is seen of a paint at a geometry.
+struct Seen {
+    color: Lab,
+    /// Luminance that one texel in a thousand exceeds.
+    top: f64,
+    /// Share of lit texels.
+    lit: f64,
+}
+
+/// What is seen of a paint whose only slice is the one here.
+fn seen(geometry: &Geometry, paint: &CarPaint) -> Seen {
     let Some(flakes) = &paint.flakes else {
-        return (geometry.lab([0.0; 3]), 0.0);
+        return Seen {
+            color: geometry.lab([0.0; 3]),
+            top: 0.0,
+            lit: 0.0,
+        };
     };
     let parts: Vec<(f64, Slice<'_>)> = vec![(1.0, flakes.slice_at(0))];
     let mean = mixed(parts.iter().map(|(w, slice)| (*w, slice.mean())));
-    let top = LightnessMixture::of(&parts).quantile(super::clustering::SPARKLE);
-    (geometry.lab(mean), luminance_of(top))
+    let mixture = LightnessMixture::of(&parts);
+    Seen {
+        color: geometry.lab(mean),
+        top: luminance_of(mixture.quantile(super::clustering::SPARKLE)),
+        lit: mixture.above(lit_from(geometry, mean)),
+    }
 }

@@ -9,6 +9,10 @@
 //! error = W1(pixels, clusters) + (cost − dual bound) + W1(slices left out, mixtures) + W1(box, rounded box)
 //! ```
 //!
+//! What instrument and eye would notice stands beside it, at the six instrument geometries: color, lit flakes, sparkle.
+//! Every step measures it against the one before, and the steps' figures are added up, which is no bound: errors that go
+//! the same way are rare, and those that cancel are counted twice.
+//!
 //! The reference profile's transport and files have none of the last three. A realisation outside the paints multiplies
 //! the first two by the sum of the weights' sizes.
 
@@ -16,9 +20,9 @@ use serde::Serialize;
 
 use super::WritingError;
 use super::writing::bundle_rounding_w1;
-use crate::blend::Blend;
+use crate::blend::{Blend, BlendDeviation};
 use crate::export::ExportSettings;
-use crate::paint::{Clustering, PaintFile};
+use crate::paint::{ASPECULAR_DEG, Clustering, PaintFile};
 
 /// Error of a result against the reference: in Lab, the distance by which its flakes' colors are misplaced.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -27,6 +31,24 @@ pub struct ResultError {
     pub lab: Option<f64>,
     /// What it is made of.
     pub terms: Vec<Term>,
+    /// What would be noticed of it; null for a solid color, and where a step was not measured.
+    pub seen: Option<SeenError>,
+}
+
+/// What would be noticed of an error: sums of what was measured step by step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SeenError {
+    /// Aspecular angles of the instrument geometries, degrees.
+    pub aspecular_deg: [f64; 6],
+    /// CIEDE2000 of the mean color at each.
+    pub delta_e_2000: [f64; 6],
+    /// Relative error of how many flakes are lit at each.
+    pub lit: [f64; 6],
+    /// Relative error of the 99.9th percentile of the flakes' luminance: of clusters nine of ten compared slices are
+    /// within, of transport and file it is the worst geometry.
+    pub sparkle: f64,
+    /// How it is known.
+    pub how: &'static str,
 }
 
 /// One term of an error.
@@ -43,11 +65,12 @@ pub struct Term {
 impl ResultError {
     /// Of what has no flakes to misplace.
     fn none() -> Self {
-        Self::of(Vec::new())
+        Self::of(Vec::new(), None)
     }
 
-    fn of(terms: Vec<Term>) -> Self {
+    fn of(terms: Vec<Term>, seen: Option<SeenError>) -> Self {
         Self {
+            seen,
             // An empty sum of f64 is -0.
             lab: (terms.iter().map(|term| term.lab).sum::<Option<f64>>()).map(|sum| sum + 0.0),
             terms,
@@ -66,9 +89,61 @@ impl ResultError {
                     ..*term
                 })
                 .collect(),
+            self.seen.map(|seen| SeenError {
+                delta_e_2000: seen.delta_e_2000.map(|error| error * by),
+                lit: seen.lit.map(|error| error * by),
+                sparkle: seen.sparkle * by,
+                ..seen
+            }),
         )
     }
 }
+
+impl SeenError {
+    /// Of clusters against pixels, where both were compared and no angle was left out since.
+    fn of_clusters(clustering: Option<&Clustering>) -> Option<Self> {
+        let clustering = clustering.filter(|own| own.left_out_w1.is_none())?;
+        let error = clustering.error.as_ref()?;
+        Some(Self {
+            aspecular_deg: ASPECULAR_DEG,
+            delta_e_2000: error.instrument,
+            lit: error.lit?,
+            sparkle: error.sparkle.p90,
+            how: SEEN,
+        })
+    }
+
+    /// The worse of two, figure by figure.
+    fn or_worse(self, other: Self) -> Self {
+        Self {
+            delta_e_2000: each(self.delta_e_2000, &other.delta_e_2000, f64::max),
+            lit: each(self.lit, &other.lit, f64::max),
+            sparkle: self.sparkle.max(other.sparkle),
+            ..self
+        }
+    }
+
+    /// With what another step adds at each geometry; nothing, where it added nothing.
+    fn and(self, delta_e_2000: &[f64], lit: &[f64], sparkle: &[f64]) -> Self {
+        let sum = |x: f64, y: f64| x + y;
+        Self {
+            delta_e_2000: each(self.delta_e_2000, delta_e_2000, sum),
+            lit: each(self.lit, lit, sum),
+            sparkle: self.sparkle + sparkle.iter().copied().fold(0.0, f64::max),
+            ..self
+        }
+    }
+}
+
+fn each(mut all: [f64; 6], others: &[f64], of: impl Fn(f64, f64) -> f64) -> [f64; 6] {
+    for (own, &other) in all.iter_mut().zip(others) {
+        *own = of(*own, other);
+    }
+    all
+}
+
+const SEEN: &str = "measured step by step and added up: clusters against pixels, of several paints the worst; a blend against exact \
+                    transport, at equal weights; a file against the paint";
 
 const CLUSTERS: &str = "measured: W1 of lightness between pixels and clusters, nine of ten of the compared slices are within; \
                         of several paints the worst";
@@ -80,7 +155,8 @@ const TRANSPORT_SAMPLED: &str = "bounded on slices spread evenly over the angles
                                  several pairs of paints the worst";
 const ANGLES: &str = "measured: W1 of lightness between slices left out and the mixtures in their place, nine of ten of the \
                       compared slices are within; of several paints the worst";
-const ROUNDING_OF_ALL: &str = "bounded: W1 between the boxes and the boxes read back, worst slice of the worst paint";
+const ROUNDING_OF_ALL: &str =
+    "bounded: W1 between the boxes and the boxes read back, worst slice of the worst paint";
 const ROUNDING: &str = "bounded: W1 between the boxes and the boxes read back, worst of the slices at the instrument geometries";
 
 /// Error of a paint; nothing is misplaced in a solid color.
@@ -89,7 +165,11 @@ pub fn paint_error(file: &PaintFile) -> ResultError {
     if file.paint.flakes.is_none() {
         return ResultError::none();
     }
-    ResultError::of(vec![clusters([file.clustering.as_ref()].into_iter())])
+    let clustering = file.clustering.as_ref();
+    ResultError::of(
+        vec![clusters([clustering].into_iter())],
+        SeenError::of_clusters(clustering),
+    )
 }
 
 /// Error of a blend at any weights between 0 and 1 that sum to 1: such a mixture moves no color further than its paints.
@@ -110,7 +190,7 @@ pub fn blend_error(blend: &Blend) -> ResultError {
         .filter_map(|clustering| Some(clustering?.left_out_w1?.p90))
         .reduce(f64::max);
     let mut terms = vec![
-        clusters(with_flakes.map(|(_, clustering)| clustering)),
+        clusters(with_flakes.clone().map(|(_, clustering)| clustering)),
         Term {
             what: "transport",
             lab: Some(worst.fold(0.0, f64::max)),
@@ -130,7 +210,14 @@ pub fn blend_error(blend: &Blend) -> ResultError {
         lab: Some(lab),
         how: ANGLES,
     }));
-    ResultError::of(terms)
+    let each = with_flakes.map(|(_, clustering)| SeenError::of_clusters(clustering));
+    let seen = each.reduce(|x, y| Some(x?.or_worse(y?))).flatten();
+    // Exact transport of the distance, from which nothing deviates, lists nothing.
+    let by = |get: fn(&BlendDeviation) -> f64| -> Vec<f64> {
+        report.against_exact.iter().map(get).collect()
+    };
+    let (color, lit, top) = (by(|d| d.delta_e_2000), by(|d| d.lit), by(|d| d.sparkle));
+    ResultError::of(terms, seen.map(|seen| seen.and(&color, &lit, &top)))
 }
 
 /// Error of a file written from a paint or a blend of this error.
@@ -141,7 +228,11 @@ pub fn file_error(of: &ResultError, writing: Option<&WritingError>) -> ResultErr
         lab: Some(writing.rounding_w1),
         how: ROUNDING,
     });
-    ResultError::of(of.terms.iter().copied().chain(rounding).collect())
+    let seen = of.seen.map(|seen| match writing {
+        Some(writing) => seen.and(&writing.instrument, &writing.lit, &writing.sparkle),
+        None => seen,
+    });
+    ResultError::of(of.terms.iter().copied().chain(rounding).collect(), seen)
 }
 
 /// Error of the bundle of a whole blend, at any weights between 0 and 1 that sum to 1.
@@ -152,7 +243,9 @@ pub fn bundle_error(blend: &Blend, settings: &ExportSettings) -> ResultError {
         lab: Some(lab),
         how: ROUNDING_OF_ALL,
     });
-    ResultError::of(blend_error(blend).terms.into_iter().chain(rounding).collect())
+    // What would be noticed of the rounding depends on the weights.
+    let of = blend_error(blend);
+    ResultError::of(of.terms.into_iter().chain(rounding).collect(), None)
 }
 
 fn clusters<'a>(of: impl Iterator<Item = Option<&'a Clustering>>) -> Term {

@@ -20,7 +20,7 @@ mod writing;
 
 pub use clustering::{clustering_error, predicted_clustering_error};
 pub use correspondence::blend_deviation;
-pub use error::{ResultError, Term, blend_error, bundle_error, file_error, paint_error};
+pub use error::{ResultError, SeenError, Term, blend_error, bundle_error, file_error, paint_error};
 pub use knobs::{CostKnob, Draw, Knobs, Preset, ProfileError, Transport};
 pub use profile::{PRESETS, Profile};
 pub use sparkle::{Sparkle, sparkle};

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::clustering::{lightness_of, luminance_of};
 use super::geometries::{Geometry, geometries, mixed};
-use crate::color::luminance;
+use crate::color::{LinearRgb, luminance};
 use crate::paint::{CarPaint, Flakes, LightnessMixture, Slice, cell_spacing};
 
 /// Sparkle at one instrument geometry.
@@ -36,6 +36,18 @@ pub fn sparkle(paint: &CarPaint) -> Vec<Sparkle> {
         .collect()
 }
 
+/// The lightness from which on a flake is lit, beside flakes of this mean: twice as bright as all of the surface.
+pub(super) fn lit_from(geometry: &Geometry, mean: LinearRgb) -> f64 {
+    let mean = std::f64::consts::PI * luminance(mean);
+    let base = geometry.base_luminance();
+    lightness_of(2.0 * (base + mean) - base)
+}
+
+/// By which part the share of lit flakes is off; less than one in a million is counted as that.
+pub(super) fn off_by(share: f64, exact: f64) -> f64 {
+    (share - exact).abs() / exact.max(1e-6)
+}
+
 fn at(geometry: &Geometry, flakes: &Flakes) -> Sparkle {
     let parts: Vec<(f64, Slice<'_>)> = geometry
         .slices(&flakes.theta_h, &flakes.theta_d)
@@ -44,9 +56,7 @@ fn at(geometry: &Geometry, flakes: &Flakes) -> Sparkle {
         .collect();
     let mixture = LightnessMixture::of(&parts);
     let mean = mixed(parts.iter().map(|(weight, slice)| (*weight, slice.mean())));
-    let mean = std::f64::consts::PI * luminance(mean);
-    let base = geometry.base_luminance();
-    let lit = mixture.above(lightness_of(2.0 * (base + mean) - base));
+    let lit = mixture.above(lit_from(geometry, mean));
     let texture = &flakes.texture;
     let cell_um = cell_spacing(texture.grain_um / texture.texel_um).max(1.0) * texture.texel_um;
     Sparkle {

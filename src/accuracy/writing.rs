@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::clustering::luminance_of;
 use super::geometries::{geometries, mixed};
+use super::sparkle::{lit_from, off_by};
 use crate::blend::{Blend, Boxes};
 use crate::color::{ciede2000, luminance};
 use crate::export::{ExportSettings, Rounding, inverse_cdf};
@@ -19,6 +20,8 @@ pub struct WritingError {
     pub instrument: Vec<f64>,
     /// Relative change of the 99.9th percentile of luminance at each geometry.
     pub sparkle: Vec<f64>,
+    /// Relative change of how many flakes are lit at each geometry.
+    pub lit: Vec<f64>,
     /// Largest share of draws that show another cluster than they should, where flakes are drawn by the 500 steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inverse_cdf_loss: Option<f64>,
@@ -67,21 +70,24 @@ pub fn writing_error(paint: &CarPaint, settings: &ExportSettings) -> Option<Writ
                 loss = loss.max(inverse_cdf(slice.probability, &light).probability_loss);
             }
         }
-        let reading = |parts: &[(f64, Slice<'_>)]| {
-            geometry.lab(mixed(parts.iter().map(|(w, slice)| (*w, slice.mean()))))
+        let mean =
+            |parts: &[(f64, Slice<'_>)]| mixed(parts.iter().map(|(w, slice)| (*w, slice.mean())));
+        let shine = |parts: &[(f64, Slice<'_>)]| {
+            let mixture = LightnessMixture::of(parts);
+            let top = luminance_of(mixture.quantile(super::clustering::SPARKLE));
+            (top, mixture.above(lit_from(&geometry, mean(parts))))
         };
-        error
-            .instrument
-            .push(ciede2000(reading(&slices), reading(&rounded)));
-        let top = |parts: &[(f64, Slice<'_>)]| {
-            luminance_of(LightnessMixture::of(parts).quantile(super::clustering::SPARKLE))
-        };
-        let exact = top(&slices);
+        let ((exact, lit), (top, lit_as_written)) = (shine(&slices), shine(&rounded));
         error.sparkle.push(if exact.abs() > 1e-9 {
-            (top(&rounded) / exact - 1.0).abs()
+            (top / exact - 1.0).abs()
         } else {
             0.0
         });
+        error.lit.push(off_by(lit_as_written, lit));
+        let reading = |parts| geometry.lab(mean(parts));
+        error
+            .instrument
+            .push(ciede2000(reading(&slices), reading(&rounded)));
     }
     error.inverse_cdf_loss = settings.inverse_cdf.then_some(loss);
     Some(error)
@@ -113,10 +119,12 @@ pub fn bundle_rounding_w1(blend: &Blend, settings: &ExportSettings) -> Option<f6
         };
         moved(&slice, &written)
     };
-    let each = flakes
-        .boxes
-        .iter()
-        .flat_map(|own| flakes.offsets.windows(2).map(move |ends| moved_in(own, ends)));
+    let each = flakes.boxes.iter().flat_map(|own| {
+        flakes
+            .offsets
+            .windows(2)
+            .map(move |ends| moved_in(own, ends))
+    });
     Some(each.fold(0.0, f64::max))
 }
 
@@ -139,4 +147,86 @@ fn moved(from: &Slice<'_>, to: &Slice<'_>) -> f64 {
             from.probability[k] * squared.sqrt()
         })
         .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blend::{BlendSettings, Ingredient, RealisationWeights};
+    use crate::export::Precision;
+    use crate::paint::{AngleGrid, ColorTable, FlakeTexture, Flakes};
+
+    /// Two slices of three boxes, shifted.
+    fn paint(shift: f32) -> CarPaint {
+        let light = [3.3, 17.7, 61.1, 5.5, 29.9, 88.3].map(|l| l + shift);
+        CarPaint {
+            coat: None,
+            diffuse: [0.1; 3],
+            lobes: Vec::new(),
+            color_table: ColorTable::white(),
+            flakes: Some(Flakes {
+                theta_h: AngleGrid::new(vec![0.0, 10.0]).expect("ascends"),
+                theta_d: AngleGrid::single(),
+                offsets: vec![0, 3, 6].into(),
+                probability: vec![0.5, 0.3, 0.2, 0.6, 0.3, 0.1].into(),
+                lower: light.map(|l| [l, -shift, 0.7]).to_vec(),
+                upper: light.map(|l| [l + 2.0 + shift, 3.1, 4.3]).to_vec(),
+                texture: FlakeTexture {
+                    texel_um: 20.0,
+                    grain_um: 15.0,
+                    lifetime_deg: [5.0; 2],
+                    persistence_deg: [9.0; 2],
+                },
+            }),
+        }
+    }
+
+    #[test]
+    fn no_mixture_of_a_bundle_is_off_by_more_than_is_stated() {
+        let (first, second) = (paint(0.37), paint(9.13));
+        let ingredients = [("first", &first), ("second", &second)]
+            .map(|(name, paint)| Ingredient { name, paint });
+        let blend = Blend::new(&ingredients, &BlendSettings::default(), &|_| ()).expect("blends");
+        for precision in [Precision::F16, Precision::Eight] {
+            let settings = ExportSettings {
+                precision,
+                ..ExportSettings::default()
+            };
+            let stated = bundle_rounding_w1(&blend, &settings).expect("flakes");
+            let mut written = blend.clone();
+            let flakes = written.flakes.as_mut().expect("flakes");
+            let all = flakes.boxes.clone();
+            let corners = all
+                .iter()
+                .flat_map(|own| own.lower.iter().chain(&own.upper));
+            let rounding = Rounding::of(corners, precision);
+            for own in &mut flakes.boxes {
+                for corner in own.lower.iter_mut().chain(&mut own.upper) {
+                    *corner = rounding.read_back(*corner);
+                }
+            }
+            let mut worst: f64 = 0.0;
+            for alpha in [0.0, 0.2, 0.5, 0.9, 1.0] {
+                let weights = RealisationWeights::uniform(vec![alpha, 1.0 - alpha]);
+                let [exact, rounded] = [&blend, &written]
+                    .map(|blend| blend.realise(&weights).expect("two weights").paint);
+                let (exact, rounded) = (
+                    exact.flakes.expect("flakes"),
+                    rounded.flakes.expect("flakes"),
+                );
+                for k in 0..exact.slices() {
+                    worst = worst.max(moved(&exact.slice_at(k), &rounded.slice_at(k)));
+                }
+            }
+            assert!(
+                worst > 0.3 * stated && worst <= stated * (1.0 + 1e-5),
+                "{worst} {stated}"
+            );
+        }
+        let exact = ExportSettings {
+            precision: Precision::F32,
+            ..ExportSettings::default()
+        };
+        assert_eq!(bundle_rounding_w1(&blend, &exact), Some(0.0));
+    }
 }

@@ -40,6 +40,9 @@ pub struct BlendDeviation {
     pub delta_e_2000: f64,
     /// Relative difference of the 99.9th percentile of the flakes' luminance.
     pub sparkle: f64,
+    /// Relative difference of how many flakes are lit.
+    #[serde(default)]
+    pub lit: f64,
 }
 
 /// How good a correspondence is.

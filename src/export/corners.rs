@@ -22,8 +22,7 @@ impl Textures {
             "corner of largest L, a, b (R, G, B) of every cluster's box, CIELAB of pi f";
         let texels = lower.len().div_ceil(width) * width;
         let height = texels / width;
-        let range =
-            (precision == Precision::Eight).then(|| Range8::of(lower.iter().chain(upper)));
+        let range = (precision == Precision::Eight).then(|| Range8::of(lower.iter().chain(upper)));
         let both = [
             ("corners_lower", lower, about_lower),
             ("corners_upper", upper, about_upper),

@@ -86,6 +86,10 @@ pub struct ClusteringError {
     pub sparkle: Percentiles,
     /// CIEDE2000 at the six instrument geometries between the means of clusters and pixels, base included.
     pub instrument: [f64; 6],
+    /// Relative error at those geometries of how many flakes are lit; pictures without any count as having one texel.
+    /// `None` by versions that did not count them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lit: Option<[f64; 6]>,
 }
 
 /// A list of errors in three numbers.

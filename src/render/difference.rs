@@ -90,7 +90,7 @@ impl Plane {
 
 /// Mean FLIP of two pictures.
 #[allow(clippy::cast_precision_loss)] // a count of pixels
-fn flip(x: &Film, y: &Film) -> f64 {
+pub(super) fn flip(x: &Film, y: &Film) -> f64 {
     let (x, y) = (opponent(x), opponent(y));
     let (seen_x, seen_y) = (seen(&x), seen(&y));
     let features = feature_differences(&x[0], &y[0]);

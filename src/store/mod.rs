@@ -25,8 +25,8 @@ mod whole_file;
 pub use blobs::{BlobBytes, BlobWriter, Blobs, Hash, LocalBlob, Stored, Task};
 pub use catalogue::{
     BlendRecord, Blends, Catalogue, EnvironmentPage, EnvironmentRecord, Environments, JobBook,
-    JobEnd, JobKind, JobRecord, JobState, NewJob, NotedPaint, PaintPage, PaintRecord, Paints, Submitted,
-    Visibility,
+    JobEnd, JobKind, JobRecord, JobState, NewJob, NotedPaint, PaintPage, PaintRecord, Paints,
+    Submitted, Visibility,
 };
 pub use error::StoreError;
 pub use folder::FolderBlobs;

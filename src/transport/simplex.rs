@@ -216,9 +216,7 @@ fn spreading_stride(rows: usize) -> usize {
     };
     // 618/1000; at the latest, the row before is one.
     let section = (rows * 618 / 1000).max(1);
-    (section..rows)
-        .find(|&stride| apart(stride))
-        .unwrap_or(1)
+    (section..rows).find(|&stride| apart(stride)).unwrap_or(1)
 }
 
 /// How far pairs may be from right, and the pivots made to get them there.

@@ -21,6 +21,33 @@ fn a_blend_is_bundled_the_same_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_bundle_meets_a_target_and_tells_its_seconds_and_its_error() {
+    let desk = Desk::with_blend();
+    let words = "bundle b.blend --max-error 1000 --timings t.json --json --out b.zip";
+    let said = json(&desk.ok(&words.split(' ').collect::<Vec<_>>()).stdout);
+    assert_eq!(said["picked"]["met"], true, "{said}");
+    assert_eq!(said["picked"]["estimate"]["knobs"]["precision"], "8bit");
+    let error = &said["report"]["accuracy"]["error"];
+    let terms = error["terms"].as_array().expect("a list");
+    let rounding = terms.iter().find(|term| term["what"] == "rounding");
+    let rounding = rounding.and_then(|term| term["lab"].as_f64());
+    assert!(rounding.is_some_and(|lab| lab > 0.01), "{error}");
+    let seconds = json(&desk.read("t.json"));
+    for stage in ["open", "bundle", "write", "total"] {
+        assert!(
+            seconds[stage].as_f64().is_some_and(|s| s > 0.0),
+            "{seconds}"
+        );
+    }
+    let estimate = json(&desk.ok(&["estimate", "bundle", "b.blend", "--json"]).stdout);
+    assert!(
+        estimate["bytes"]
+            .as_u64()
+            .is_some_and(|bytes| bytes > 10_000)
+    );
+}
+
+#[test]
 fn what_is_no_blend_or_no_zip_is_refused() {
     let desk = Desk::with_blend();
     let said = desk.refused(2, &["bundle", "sample:white", "--out", "w.zip"]);

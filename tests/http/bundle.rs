@@ -1,6 +1,7 @@
 //! The bundle of a whole blend.
 
 use futures::future::join_all;
+use serde_json::json;
 
 use super::house::House;
 
@@ -41,6 +42,44 @@ async fn the_bundle_of_a_blend_is_made_once_and_kept_for_ever() {
         house.count("carpaint_blend_bundles_computed_total").await,
         2.0
     );
+    let aimed = house.get(&format!("{address}?max_error=0.5")).await;
+    assert_eq!(aimed.status, 200, "{}", aimed.text());
+    let target = aimed.header("carpaint-target").expect("what was picked");
+    assert!(target.contains("profile=reference"), "{target}");
+    assert!(
+        aimed
+            .header("cache-control")
+            .is_some_and(|kept| !kept.contains("immutable"))
+    );
+    house
+        .get(&format!("{address}?max_error=0.5&profile=draft"))
+        .await
+        .problem(400, "invalid-parameter");
+    let estimate = |order: serde_json::Value| {
+        let (house, text) = (&house, order.to_string());
+        async move { house.post_json("/v1/estimates", &text).await }
+    };
+    let told = estimate(json!({"work": "bundle", "blend": blend})).await;
+    assert_eq!(told.status, 200, "{}", told.text());
+    for (order, pointer) in [
+        (json!({"work": "bundle"}), "/blend"),
+        (json!({"work": "bundle", "blend": "b_1"}), "/blend"),
+        (
+            json!({"work": "bundle", "blend": blend, "weights": [1, 0]}),
+            "/weights",
+        ),
+        (
+            json!({"work": "realise", "paint": a, "lights": []}),
+            "/lights",
+        ),
+        (
+            json!({"work": "realise", "paint": a, "blend": blend}),
+            "/paint",
+        ),
+    ] {
+        let problem = estimate(order).await.problem(422, "invalid-value");
+        assert_eq!(problem["pointer"], pointer, "{problem}");
+    }
     house
         .get(&format!("{address}?weights=1,0"))
         .await

@@ -160,7 +160,7 @@ async fn a_silly_field_is_refused_with_its_place_its_value_and_what_is_accepted(
             estimated(r#""format":"zip""#),
             "/format",
             "The work preview, of a paint, takes no format.",
-            "paint, scene, size, show, environment",
+            "paint, scene, size, show, environment, lights",
         ),
     ];
     for (path, body, pointer, detail, accepted) in cases {

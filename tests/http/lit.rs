@@ -58,6 +58,14 @@ async fn a_picture_is_lit_by_the_panorama_that_is_asked_for() {
         assert_eq!(problem["pointer"], format!("/{field}"), "{problem}");
         assert!(problem["accepted"].is_string(), "{problem}");
     }
+    let lit_from_above = json!({
+        "work": "preview", "paint": paint, "size": [24, 16], "lights": [{"towards": [0, 1, 0]}],
+    });
+    assert_eq!(estimate(lit_from_above.clone()).await.status, 200);
+    let mut unlit = lit_from_above;
+    unlit["lights"][0]["towards"] = json!([0, 0, 0]);
+    let problem = estimate(unlit).await.problem(422, "invalid-value");
+    assert_eq!(problem["pointer"], "/lights/0", "{problem}");
     let order = json!({"work": "realise", "paint": paint, "environment": blue});
     let problem = estimate(order).await.problem(422, "invalid-value");
     assert_eq!(problem["pointer"], "/environment");

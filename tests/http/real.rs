@@ -107,7 +107,7 @@ async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again
     let address = format!("{base}/realisation.zip?weights=1,0&profile=clusters%3D7");
     house.get(&address).await.problem(400, "invalid-parameter");
     house
-        .get(&format!("{base}/bundle.zip?max_error=1"))
+        .get(&format!("{base}/bundle.zip?max_error=0"))
         .await
         .problem(400, "invalid-parameter");
     for option in [

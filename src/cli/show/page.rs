@@ -109,6 +109,19 @@ impl Page {
                 .map_or("not known".to_owned(), |lab| format!("{lab:.3} Lab"));
             self.line("error", format!("{}: {how_far} ({})", term.what, term.how));
         }
+        if let Some(seen) = &error.seen {
+            let worst = |errors: &[f64; 6]| errors.iter().copied().fold(0.0, f64::max);
+            self.line(
+                "seen",
+                format!(
+                    "at the instrument geometries ΔE2000 up to {:.2}, {:.1} % of the lit flakes, {:.1} % of the sparkle ({})",
+                    worst(&seen.delta_e_2000),
+                    100.0 * worst(&seen.lit),
+                    100.0 * seen.sparkle,
+                    seen.how
+                ),
+            );
+        }
     }
 
     pub fn text(self) -> String {

@@ -68,16 +68,18 @@ pub(super) fn ladder(work: &Work<'_>) -> Vec<Profile> {
             ..
         }
         | Work::Preview(_) => vec![standard],
-        Work::Realise { .. } | Work::Bundle { .. } => [Precision::Eight, Precision::F16, Precision::F32]
-            .into_iter()
-            .map(|precision| Profile {
-                export: ExportSettings {
-                    precision,
-                    ..standard.export
-                },
-                ..standard
-            })
-            .collect(),
+        Work::Realise { .. } | Work::Bundle { .. } => {
+            [Precision::Eight, Precision::F16, Precision::F32]
+                .into_iter()
+                .map(|precision| Profile {
+                    export: ExportSettings {
+                        precision,
+                        ..standard.export
+                    },
+                    ..standard
+                })
+                .collect()
+        }
     }
 }
 
