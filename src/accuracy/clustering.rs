@@ -113,8 +113,7 @@ fn compared(
         Percentiles::of(compared.iter().filter_map(get).collect())
     };
     let [width, height] = pictures.size();
-    #[allow(clippy::cast_precision_loss)] // a count of pixels
-    let one_texel = 1.0 / (width * height).max(1) as f64;
+    let one_texel = 1.0 / f64::from((width * height).max(1));
     let (mut instrument, mut lit) = ([0.0; 6], [0.0; 6]);
     for (at, geometry) in seen.iter().enumerate() {
         let here = geometry.slices(pictures.theta_h(), pictures.theta_d());

@@ -145,32 +145,33 @@ fn blocks<const PAINTS: usize>(
     out: &mut Boxes,
 ) -> Account {
     let mut account = Account::default();
-    let clusters = paints[0].lower.len();
-    // New memory is not cleared first, which would cost half as much again: blocks are summed in the nearest cache and
-    // appended.
-    let in_place = [&out.lower, &out.upper].map(|list| list.len()) == [clusters; 2];
-    if !in_place {
-        for list in [&mut out.lower, &mut out.upper] {
+    let numbers = paints[0].lower.as_flattened().len();
+    let mut lists =
+        [&mut out.lower, &mut out.upper].map(|list| std::mem::take(list).into_flattened());
+    // Used memory is written over. New memory would have to be cleared first: it is appended to, list by list.
+    let over = lists.iter().all(|list| list.len() == numbers);
+    if !over {
+        for list in &mut lists {
             list.clear();
-            list.reserve_exact(clusters);
+            list.reserve_exact(numbers);
         }
     }
-    let mut new = [[0.0; BLOCK]; 2];
-    for first in (0..3 * clusters).step_by(BLOCK) {
-        let here = first..(first + BLOCK).min(3 * clusters);
-        let [low, high] = if in_place {
-            [&mut out.lower, &mut out.upper].map(|list| &mut list.as_flattened_mut()[here.clone()])
-        } else {
-            new.each_mut().map(|block| &mut block[..here.len()])
-        };
+    for first in (0..numbers).step_by(BLOCK) {
+        let here = first..(first + BLOCK).min(numbers);
         let [lower, upper] = [
             paints.map(|own| &own.lower.as_flattened()[here.clone()]),
             paints.map(|own| &own.upper.as_flattened()[here.clone()]),
         ];
-        let (ordered, beyond) = if leaves {
-            sums::<PAINTS, true>(weights, lower, upper, low, high)
-        } else {
-            sums::<PAINTS, false>(weights, lower, upper, low, high)
+        if !over {
+            append_sums(weights, lower, &mut lists[0]);
+            append_sums(weights, upper, &mut lists[1]);
+        }
+        let [low, high] = lists.each_mut().map(|list| &mut list[here.clone()]);
+        let (ordered, beyond) = match (over, leaves) {
+            (true, true) => sums::<PAINTS, true>(weights, lower, upper, low, high),
+            (true, false) => sums::<PAINTS, false>(weights, lower, upper, low, high),
+            (false, true) => looked_at::<true>(low, high),
+            (false, false) => looked_at::<false>(low, high),
         };
         if beyond {
             for (low, high) in low.iter_mut().zip(high) {
@@ -179,13 +180,68 @@ fn blocks<const PAINTS: usize>(
         } else if !ordered {
             account.put_in_order(low, high);
         }
-        if !in_place {
-            for (list, block) in [&mut out.lower, &mut out.upper].into_iter().zip(&new) {
-                list.extend_from_slice(block[..here.len()].as_chunks().0);
-            }
+    }
+    [out.lower, out.upper] = lists.map(corner_by_corner);
+    account
+}
+
+/// The same list in the same memory, as long as that holds whole corners.
+fn corner_by_corner(numbers: Vec<f32>) -> Vec<[f32; 3]> {
+    let cast = bytemuck::allocation::try_cast_vec(numbers);
+    cast.unwrap_or_else(|(_, numbers)| numbers.as_chunks().0.to_vec())
+}
+
+/// Appends one corner of a block of at most [`BLOCK`] numbers to a list.
+#[inline(never)]
+fn append_sums<const PAINTS: usize>(
+    weights: &[impl Weight; PAINTS],
+    corners: [&[f32]; PAINTS],
+    list: &mut Vec<f32>,
+) {
+    let count = corners[0].len().min(BLOCK);
+    let corners = corners.map(|own| &own[..count]);
+    list.extend((0..count).map(|k| {
+        let mut sum = weights[0].at(k) * corners[0][k];
+        for m in 1..PAINTS {
+            sum += weights[m].at(k) * corners[m][k];
+        }
+        sum
+    }));
+}
+
+/// What [`sums`] says of a block that is summed already.
+#[inline(never)]
+fn looked_at<const WATCH: bool>(low: &[f32], high: &[f32]) -> (bool, bool) {
+    let mut seen = Seen::default();
+    for (&l, &h) in low.iter().zip(high) {
+        seen.look::<WATCH>(l, h);
+    }
+    seen.told()
+}
+
+/// What is gathered of sums on their way.
+#[derive(Default)]
+struct Seen {
+    signs: u32,
+    beyond: u32,
+}
+
+impl Seen {
+    #[inline(always)]
+    fn look<const WATCH: bool>(&mut self, l: f32, h: f32) {
+        self.signs |= (h - l).to_bits();
+        if WATCH {
+            // Magnitudes compare like their bits: the sign says whether one is beyond the bound.
+            self.beyond |= BOUND.wrapping_sub(l.to_bits() & MAGNITUDE);
+            self.beyond |= BOUND.wrapping_sub(h.to_bits() & MAGNITUDE);
         }
     }
-    account
+
+    /// Whether no box is inside out, and whether a number is beyond.
+    #[inline(always)]
+    fn told(&self) -> (bool, bool) {
+        (self.signs >> 31 == 0, self.beyond >> 31 == 1)
+    }
 }
 
 /// One weight for all three axes, or weights that repeat along a block.
@@ -222,7 +278,7 @@ fn sums<const PAINTS: usize, const WATCH: bool>(
     let count = low.len().min(BLOCK);
     let (low, high) = (&mut low[..count], &mut high[..count]);
     let (lower, upper) = (lower.map(|l| &l[..count]), upper.map(|u| &u[..count]));
-    let (mut signs, mut beyond) = (0_u32, 0_u32);
+    let mut seen = Seen::default();
     for k in 0..count {
         let mut l = weights[0].at(k) * lower[0][k];
         let mut h = weights[0].at(k) * upper[0][k];
@@ -230,15 +286,10 @@ fn sums<const PAINTS: usize, const WATCH: bool>(
             l += weights[m].at(k) * lower[m][k];
             h += weights[m].at(k) * upper[m][k];
         }
-        signs |= (h - l).to_bits();
-        if WATCH {
-            // Magnitudes compare like their bits: the sign says whether one is beyond the bound.
-            beyond |= BOUND.wrapping_sub(l.to_bits() & MAGNITUDE);
-            beyond |= BOUND.wrapping_sub(h.to_bits() & MAGNITUDE);
-        }
+        seen.look::<WATCH>(l, h);
         (low[k], high[k]) = (l, h);
     }
-    (signs >> 31 == 0, beyond >> 31 == 1)
+    seen.told()
 }
 
 #[cfg(test)]

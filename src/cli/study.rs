@@ -12,8 +12,8 @@ use crate::workshop::{StudyOptions, WorkshopError, study};
 
 /// Measure error against time for every knob, and write study.json, a page and plots.
 ///
-/// Each PAINT is a measurement with pictures of flakes, or a metallic sample; four samples unless given. Takes two to
-/// four minutes on two processors. A service whose data folder holds study.json serves it at /v1/accuracy.
+/// Each PAINT is a measurement with pictures of flakes, or a metallic sample; four samples unless given. Takes about a
+/// minute on two processors. A service whose data folder holds study.json serves it at /v1/accuracy.
 #[derive(Args, Clone, Debug)]
 pub struct Study {
     /// Two paints or more; the first two are blended.

@@ -39,8 +39,8 @@ pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use work::{
     Asked, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Picked, Picture,
-    PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing, View, WorkError,
-    Works, Workshop,
+    PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing, View, Works,
+    Workshop, WorkshopError,
 };
 
 use std::path::PathBuf;

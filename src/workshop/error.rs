@@ -115,6 +115,15 @@ pub fn accepted(message: &str) -> Option<&str> {
 }
 
 impl WorkshopError {
+    /// The same without the name of the file that an upload is kept in, which its owner does not know.
+    #[must_use]
+    pub fn without(self, file: &str) -> Self {
+        Self {
+            message: self.message.replace(file, "the upload"),
+            ..self
+        }
+    }
+
     /// A request that does not fit together.
     pub fn usage(field: &str, message: impl Display) -> Self {
         Self {

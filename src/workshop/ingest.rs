@@ -186,12 +186,7 @@ pub fn ingest_upload(
     progress: &(dyn Fn(f32) + Sync),
     ended: &dyn Fn(&'static str),
 ) -> Result<PaintFile, WorkshopError> {
-    let named = |error: WorkshopError| WorkshopError {
-        message: error
-            .message
-            .replace(&path.display().to_string(), "the upload"),
-        ..error
-    };
+    let named = |error: WorkshopError| error.without(&path.display().to_string());
     if !is_paint_file(path)? {
         // The file is called by the hash of its bytes, which is no name: better what it says about itself.
         let description = |said: Option<&str>| said.unwrap_or_default().to_owned();

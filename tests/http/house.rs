@@ -10,7 +10,7 @@ use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
     App, Asked, Estimate, Fault, Format, Gloss, IngestOrder, Picked, Picture, PictureFormat,
-    Progress, Readings, ServiceConfig, Target, Thing, View, WorkError, Works, Workshop, open,
+    Progress, Readings, ServiceConfig, Target, Thing, View, Works, Workshop, WorkshopError, open,
     serve,
 };
 use carpaint::workshop::{Environment, EstimatedError, Inside, sample_by_name};
@@ -25,8 +25,8 @@ use crate::client::{Answer, ask};
 #[derive(Debug)]
 pub struct Pretend;
 
-fn refuse(fault: Fault, message: impl Into<String>) -> WorkError {
-    WorkError {
+fn refuse(fault: Fault, message: impl Into<String>) -> WorkshopError {
+    WorkshopError {
         fault,
         field: None,
         inside: Inside::default(),
@@ -41,13 +41,13 @@ impl Works for Pretend {
         order: &IngestOrder,
         progress: Progress<'_>,
         ended: &dyn Fn(&'static str),
-    ) -> Result<PaintFile, WorkError> {
+    ) -> Result<PaintFile, WorkshopError> {
         let bytes =
             std::fs::read(upload).map_err(|error| refuse(Fault::Internal, error.to_string()))?;
         let words = String::from_utf8_lossy(&bytes);
         if words.starts_with("not") {
             return Err(refuse(
-                Fault::Upload,
+                Fault::Input,
                 format!("{}: this is no measurement", upload.display()),
             ));
         }
@@ -93,7 +93,7 @@ impl Works for Pretend {
         paints: &[&PaintFile],
         _: &Profile,
         progress: Progress<'_>,
-    ) -> Result<Blend, WorkError> {
+    ) -> Result<Blend, WorkshopError> {
         std::thread::sleep(Duration::from_millis(100));
         let ingredients: Vec<Ingredient<'_>> = paints
             .iter()
@@ -103,7 +103,7 @@ impl Works for Pretend {
             })
             .collect();
         Blend::new(&ingredients, &BlendSettings::default(), progress)
-            .map_err(|e| refuse(Fault::Request, e.to_string()))
+            .map_err(|e| refuse(Fault::Usage, e.to_string()))
     }
 
     fn realise(
@@ -112,7 +112,7 @@ impl Works for Pretend {
         weights: Option<&RealisationWeights>,
         format: Format,
         _: &Profile,
-    ) -> Result<Vec<u8>, WorkError> {
+    ) -> Result<Vec<u8>, WorkshopError> {
         std::thread::sleep(Duration::from_millis(50));
         let diffuse = match thing {
             Thing::Paint(file) => file.paint.diffuse,
@@ -121,7 +121,7 @@ impl Works for Pretend {
                 assert!(weights.flake_saturation != 666.0, "told to");
                 blend
                     .realise(weights)
-                    .map_err(|e| refuse(Fault::Request, e.to_string()))?
+                    .map_err(|e| refuse(Fault::Usage, e.to_string()))?
                     .paint
                     .diffuse
             }
@@ -129,7 +129,7 @@ impl Works for Pretend {
         Ok(format!("{format:?} {diffuse:?}").into_bytes())
     }
 
-    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError> {
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkshopError> {
         carpaint::service::Workshop::new(carpaint::paint::Limits::default()).bundle(blend, profile)
     }
 
@@ -141,7 +141,7 @@ impl Works for Pretend {
         _: Option<&Environment>,
         format: PictureFormat,
         progress: Progress<'_>,
-    ) -> Result<Picture, WorkError> {
+    ) -> Result<Picture, WorkshopError> {
         let paint = self.realise(thing, weights, Format::Json, &Profile::default())?;
         // A tall picture takes its time.
         let begun = Instant::now();
@@ -156,7 +156,7 @@ impl Works for Pretend {
         })
     }
 
-    fn readings(&self, paint: &Thing, angles: Option<&[f64]>) -> Result<Readings, WorkError> {
+    fn readings(&self, paint: &Thing, angles: Option<&[f64]>) -> Result<Readings, WorkshopError> {
         carpaint::service::Workshop::new(carpaint::paint::Limits::default()).readings(paint, angles)
     }
 
@@ -164,16 +164,16 @@ impl Works for Pretend {
         &self,
         paint: &Thing,
         angles: Option<&[f64]>,
-    ) -> Result<String, WorkError> {
+    ) -> Result<String, WorkshopError> {
         let works = carpaint::service::Workshop::new(carpaint::paint::Limits::default());
         works.readings_document(paint, angles)
     }
 
-    fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkError> {
+    fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkshopError> {
         carpaint::service::Workshop::new(carpaint::paint::Limits::default()).gloss(paint)
     }
 
-    fn estimate(&self, _: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError> {
+    fn estimate(&self, _: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkshopError> {
         Ok(Estimate {
             profile: profile.name(),
             knobs: *profile,
@@ -187,7 +187,7 @@ impl Works for Pretend {
         })
     }
 
-    fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkError> {
+    fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkshopError> {
         let draft = target.max_error.is_none_or(|most| most > 1.0);
         let profile = if draft {
             Profile::draft()

@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 
 use super::kind::Kind;
 use super::origins;
-use crate::service::work::{Fault, WorkError};
+use crate::service::work::{Fault, WorkshopError};
 use crate::store::StoreError;
 use crate::workshop::accepted;
 
@@ -210,59 +210,54 @@ impl From<StoreError> for Problem {
     }
 }
 
-impl WorkError {
-    /// The same error without the name of the file that an upload was kept in.
-    #[must_use]
-    pub fn without(self, file: &str) -> Self {
-        Self {
-            message: self.message.replace(file, "the upload"),
-            ..self
-        }
-    }
-
+/// What goes wrong in the workshop, told by where it came in.
+impl Problem {
     /// The problem with an upload, or with the query that came with it.
     #[must_use]
-    pub fn of_upload(self) -> Problem {
-        if self.fault != Fault::Upload {
-            return self.of_query();
+    pub fn of_upload(error: WorkshopError) -> Self {
+        if error.fault != Fault::Input {
+            return Self::of_query(error);
         }
-        let problem = Problem {
-            file: self.inside.file.clone(),
-            ..Problem::new(Kind::UnusableMeasurement, &*self.message)
+        let problem = Self {
+            file: error.inside.file.clone(),
+            ..Self::new(Kind::UnusableMeasurement, &*error.message)
         };
-        self.accepting(match (&self.field, &self.inside.pointer) {
+        let problem = match (&error.field, &error.inside.pointer) {
             (Some(field), _) => problem.at(Place::Query, format!("/{field}")),
             (None, Some(pointer)) => problem.at(Place::Body, pointer),
             // The body, or the file in it, as a whole.
             (None, None) => problem.at(Place::Body, ""),
-        })
-    }
-
-    /// Says what would be accepted, where the message does.
-    fn accepting(&self, problem: Problem) -> Problem {
-        match accepted(&self.message) {
-            Some(what) => problem.accepting(what),
-            None => problem,
-        }
+        };
+        problem.accepting_as(&error)
     }
 
     /// The problem with a query.
     #[must_use]
-    pub fn of_query(self) -> Problem {
-        match (self.fault, &self.field) {
-            (Fault::Internal, _) => Problem::internal(self.message),
-            (_, Some(field)) => self.accepting(Problem::parameter(field, &*self.message)),
-            (_, None) => self.accepting(Problem::new(Kind::InvalidParameter, &*self.message)),
-        }
+    pub fn of_query(error: WorkshopError) -> Self {
+        let problem = match (error.fault, &error.field) {
+            (Fault::Internal | Fault::Output, _) => return Self::internal(error.message),
+            (_, Some(field)) => Self::parameter(field, &*error.message),
+            (_, None) => Self::new(Kind::InvalidParameter, &*error.message),
+        };
+        problem.accepting_as(&error)
     }
 
     /// The problem with a JSON body.
     #[must_use]
-    pub fn of_body(self) -> Problem {
-        match (self.fault, &self.field) {
-            (Fault::Internal, _) => Problem::internal(self.message),
-            (_, Some(field)) => self.accepting(Problem::value(format!("/{field}"), &*self.message)),
-            (_, None) => self.accepting(Problem::new(Kind::InvalidValue, &*self.message)),
+    pub fn of_body(error: WorkshopError) -> Self {
+        let problem = match (error.fault, &error.field) {
+            (Fault::Internal | Fault::Output, _) => return Self::internal(error.message),
+            (_, Some(field)) => Self::value(format!("/{field}"), &*error.message),
+            (_, None) => Self::new(Kind::InvalidValue, &*error.message),
+        };
+        problem.accepting_as(&error)
+    }
+
+    /// Says what would be accepted, where the error's message does.
+    fn accepting_as(self, error: &WorkshopError) -> Self {
+        match accepted(&error.message) {
+            Some(what) => self.accepting(what),
+            None => self,
         }
     }
 }

@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 
 use crate::service::http::{Answer, Keep, Problem};
 use crate::service::shelf::Shelved;
-use crate::service::work::{Picked, Target, TargetDocument, WorkError};
+use crate::service::work::{Picked, Target, TargetDocument, WorkshopError};
 
 const TARGET: HeaderName = HeaderName::from_static("carpaint-target");
 
@@ -24,7 +24,7 @@ pub fn of_query(
     max_seconds: Option<f64>,
     knobs: bool,
 ) -> Result<Target, Problem> {
-    let target = checked(max_error, max_seconds, WorkError::of_query)?;
+    let target = checked(max_error, max_seconds, Problem::of_query)?;
     match (target.is_some() && knobs, field(&target)) {
         (true, field) => Err(Problem::parameter(field, beside_knobs(field)).accepting(EITHER)),
         _ => Ok(target),
@@ -41,7 +41,7 @@ pub fn of_body(
     max_seconds: Option<f64>,
     knobs: bool,
 ) -> Result<Target, Problem> {
-    let target = checked(max_error, max_seconds, WorkError::of_body)?;
+    let target = checked(max_error, max_seconds, Problem::of_body)?;
     match (target.is_some() && knobs, field(&target)) {
         (true, field) => {
             Err(Problem::value(format!("/{field}"), beside_knobs(field)).accepting(EITHER))
@@ -67,7 +67,7 @@ fn field(target: &Target) -> &'static str {
 fn checked(
     max_error: Option<f64>,
     max_seconds: Option<f64>,
-    problem: impl FnOnce(WorkError) -> Problem,
+    problem: impl FnOnce(WorkshopError) -> Problem,
 ) -> Result<Target, Problem> {
     let target = Target {
         max_error,
@@ -76,7 +76,7 @@ fn checked(
     target
         .check()
         .map(|()| target)
-        .map_err(|error| problem(error.into()))
+        .map_err(problem)
 }
 
 /// What is told about a paint or a blend, with what was picked for it.

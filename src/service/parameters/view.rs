@@ -14,9 +14,7 @@ use crate::service::app::App;
 use crate::service::environments::{self, STUDIO, Unread};
 use crate::service::http::{Place, Problem};
 use crate::service::shelf::Shelved;
-use crate::service::work::{
-    Asked, Light, Picked, PictureFormat, Shape, Show, Target, View, WorkError,
-};
+use crate::service::work::{Asked, Light, Picked, PictureFormat, Shape, Show, Target, View};
 use crate::workshop::MOST_SAMPLES;
 
 /// Longest side of a picture.
@@ -183,7 +181,7 @@ pub async fn picked(
             environment: environment.as_deref(),
             format,
         };
-        works.pick(&asked, &target).map_err(WorkError::of_query)
+        works.pick(&asked, &target).map_err(Problem::of_query)
     });
     let found = found.await?;
     view.samples_per_pixel = found.profile().samples_per_pixel;

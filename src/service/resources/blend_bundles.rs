@@ -11,7 +11,7 @@ use crate::service::app::App;
 use crate::service::http::{Address, Answer, BlendProblems, Problem, Query};
 use crate::service::ids;
 use crate::service::parameters::{ProfileText, targets};
-use crate::service::work::{Asked, WorkError};
+use crate::service::work::Asked;
 
 /// How accurately a bundle is written.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -60,7 +60,7 @@ pub async fn bundle(
             let asked = Asked::Bundle {
                 thing: &blend.thing,
             };
-            works.pick(&asked, &target).map_err(WorkError::of_query)
+            works.pick(&asked, &target).map_err(Problem::of_query)
         });
         let found = found.await?;
         profile = *found.profile();
@@ -83,7 +83,7 @@ pub async fn bundle(
             .bench
             .run(move || works.bundle(&blend.thing, &profile))
             .await?;
-        let bytes = made.map_err(WorkError::of_query)?;
+        let bytes = made.map_err(Problem::of_query)?;
         counter.increment(1);
         Ok(bytes.into())
     };

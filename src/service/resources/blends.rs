@@ -18,7 +18,7 @@ use crate::service::http::{
 };
 use crate::service::ids;
 use crate::service::parameters::{ProfileDocument, ProfileText, targets};
-use crate::service::work::{Asked, BlendRequest, JobDocument, Picked, Target, WorkError, runner};
+use crate::service::work::{Asked, BlendRequest, JobDocument, Picked, Target, runner};
 use crate::store::JobKind;
 use crate::workshop::check_clusters;
 
@@ -154,7 +154,7 @@ async fn pick(app: &App, ids: &[String], target: Target) -> Result<Picked, Probl
     let pick = move || {
         let paints: Vec<&PaintFile> = shelved.iter().filter_map(|p| p.file_of_paint()).collect();
         let asked = Asked::Blend { paints: &paints };
-        works.pick(&asked, &target).map_err(WorkError::of_body)
+        works.pick(&asked, &target).map_err(Problem::of_body)
     };
     app.pick(&("blend", ids, target), pick).await
 }

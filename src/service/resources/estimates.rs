@@ -20,7 +20,7 @@ use crate::service::http::{Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDo
 use crate::service::parameters::{of_field, targets};
 use crate::service::shelf::Shelved;
 use crate::service::work::{
-    Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, View, WorkError,
+    Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, View, WorkshopError,
 };
 use crate::store::LocalBlob;
 use crate::workshop::Environment;
@@ -98,9 +98,9 @@ pub async fn create(
         Needed::Ingest(local, _) => Some(local.path().display().to_string()),
         _ => None,
     };
-    let told = move |error: WorkError| {
-        WorkError::of_body(match &kept_in {
-            Some(file) => WorkError {
+    let told = move |error: WorkshopError| {
+        Problem::of_body(match &kept_in {
+            Some(file) => WorkshopError {
                 field: Some("paint".to_owned()),
                 ..error.without(file)
             },

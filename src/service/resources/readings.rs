@@ -9,7 +9,7 @@ use utoipa::IntoParams;
 
 use crate::service::app::App;
 use crate::service::http::{Address, Answer, Keep, PaintProblems, Problem, ProblemDocument, Query};
-use crate::service::work::{CXF_MEDIA_TYPE, Gloss, Readings, Thing, WorkError, Works};
+use crate::service::work::{CXF_MEDIA_TYPE, Gloss, Readings, Thing, Works, WorkshopError};
 
 /// Where an instrument looks from.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -112,13 +112,13 @@ pub async fn document(
 async fn read<T: Send + 'static>(
     app: &App,
     id: &str,
-    instruments: impl FnOnce(&dyn Works, &Thing) -> Result<T, WorkError> + Send + 'static,
+    instruments: impl FnOnce(&dyn Works, &Thing) -> Result<T, WorkshopError> + Send + 'static,
     answer: impl FnOnce(T, Keep) -> Answer,
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let paint = app.paint(id).await?;
     let (works, keep) = (Arc::clone(&app.works), paint.keep_changing());
     let read = app.bench.run(move || instruments(&*works, &paint.thing));
-    let told = read.await?.map_err(WorkError::of_query)?;
+    let told = read.await?.map_err(Problem::of_query)?;
     Ok(answer(told, keep).stage("reading", begun.elapsed()))
 }

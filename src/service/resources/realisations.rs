@@ -15,7 +15,7 @@ use crate::service::http::{
 use crate::service::ids;
 use crate::service::parameters::{ProfileText, WeightQuery, targets};
 use crate::service::shelf::Shelved;
-use crate::service::work::{Asked, Format, WorkError};
+use crate::service::work::{Asked, Format};
 
 /// How accurately a file is written.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -99,7 +99,7 @@ async fn realise(
                 weights: weights.as_ref(),
                 format,
             };
-            works.pick(&asked, &target).map_err(WorkError::of_query)
+            works.pick(&asked, &target).map_err(Problem::of_query)
         });
         let found = found.await?;
         profile = *found.profile();
@@ -121,7 +121,7 @@ async fn realise(
             .bench
             .run(move || works.realise(&thing.thing, weights.as_ref(), format, &profile))
             .await?;
-        let bytes = made.map_err(WorkError::of_query)?;
+        let bytes = made.map_err(Problem::of_query)?;
         counter.increment(1);
         Ok(bytes.into())
     };

@@ -222,7 +222,7 @@ async fn pick_for_upload(
         let folder = local.path().display().to_string();
         works
             .pick(&asked, &target)
-            .map_err(|error| error.without(&folder).of_upload())
+            .map_err(|error| Problem::of_upload(error.without(&folder)))
     };
     app.pick(&whole, pick).await
 }

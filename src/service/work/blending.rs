@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::runner::Ended;
 use super::under_way::UnderWay;
 use super::workbench::CalledOff;
-use super::works::WorkError;
+use super::works::WorkshopError;
 use crate::accuracy::Profile;
 use crate::paint::PaintFile;
 use crate::service::app::App;
@@ -94,7 +94,7 @@ async fn correspond(
             .filter_map(|paint| paint.file_of_paint())
             .collect();
         let blend = works.blend(&files, &profile, progress)?;
-        Ok::<_, WorkError>(Bytes::from(blend.to_bytes()?))
+        Ok::<_, WorkshopError>(Bytes::from(blend.to_bytes()?))
     });
     let Ok(found) = found.await? else {
         return Err(Problem::new(
@@ -102,7 +102,7 @@ async fn correspond(
             "The job that found this correspondence was cancelled.",
         ));
     };
-    let file = found.map_err(WorkError::of_body)?;
+    let file = found.map_err(Problem::of_body)?;
     app.metrics.blends_computed.increment(1);
     Ok(file)
 }

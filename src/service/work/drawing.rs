@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use super::workbench::call_off;
-use super::works::{Picture, PictureFormat, Show, View, WorkError};
+use super::works::{Picture, PictureFormat, Show, View};
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::environments::Unread;
@@ -79,7 +79,7 @@ pub async fn draw(
                 let (thing, weights, light) =
                     (&thing.thing, weights.as_ref(), environment.as_deref());
                 let drawn = works.preview(thing, weights, &view, light, format, &progress);
-                Ok(kept_form(&drawn.map_err(WorkError::of_query)?))
+                Ok(kept_form(&drawn.map_err(Problem::of_query)?))
             });
             let Ok(drawn) = drawn.await? else {
                 return Err(Problem::new(

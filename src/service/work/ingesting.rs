@@ -12,7 +12,7 @@ use tokio::sync::SemaphorePermit;
 use super::runner::Ended;
 use super::under_way::UnderWay;
 use super::workbench::CalledOff;
-use super::works::{IngestOrder, WorkError};
+use super::works::IngestOrder;
 use crate::service::app::App;
 use crate::service::http::{Kind, Problem};
 use crate::store::{Hash, JobRecord};
@@ -66,7 +66,7 @@ pub async fn ingest(
     let Ok(fitted) = fitted.await? else {
         return Ok(Err(CalledOff));
     };
-    let (file, is_fit) = fitted.map_err(WorkError::of_upload)?;
+    let (file, is_fit) = fitted.map_err(Problem::of_upload)?;
     if is_fit {
         app.metrics.paints_fitted.increment(1);
     }

@@ -30,6 +30,6 @@ pub use workbench::{Workbench, call_off};
 pub use works::{
     Asked, CXF_MEDIA_TYPE, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Picked,
     Picture, PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing, View,
-    WorkError, Works,
+    Works, WorkshopError,
 };
 pub use workshop::Workshop;

@@ -8,16 +8,16 @@ use serde_json::Value;
 
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
-use crate::paint::{NotFinite, PaintFile};
-use crate::workshop::{Environment, Inside};
+use crate::paint::PaintFile;
+use crate::workshop::Environment;
 
 /// Share done, from 0 to 1. It does not return when the work was called off.
 pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
 pub use crate::measurement::{Layout, ThetaHSpacing};
 pub use crate::workshop::{
-    CXF_MEDIA_TYPE, Estimate, Format, Gloss, Light, Picked, PictureFormat, Readings, Shape, Show,
-    Target, Thing,
+    CXF_MEDIA_TYPE, Estimate, Fault, Format, Gloss, Light, Picked, PictureFormat, Readings, Shape,
+    Show, Target, Thing, WorkshopError,
 };
 
 /// How an upload becomes a paint.
@@ -114,94 +114,58 @@ pub struct Picture {
     pub report: Value,
 }
 
-/// Whose fault it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// The request asks for something that is not offered or does not fit together.
-    Request,
-    /// The upload is not what it should be.
-    Upload,
-    /// A bug, or a machine that fails us.
-    Internal,
-}
-
-/// Work that failed.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{message}")]
-pub struct WorkError {
-    /// Whose fault it is.
-    pub fault: Fault,
-    /// The field that is wrong, where one can be named.
-    pub field: Option<String>,
-    /// Where in an upload, where that can be said.
-    pub inside: Inside,
-    /// What is wrong, with the value and what would be accepted.
-    pub message: String,
-}
-
-impl From<NotFinite> for WorkError {
-    fn from(error: NotFinite) -> Self {
-        Self {
-            fault: Fault::Internal,
-            field: None,
-            inside: Inside::default(),
-            message: error.to_string(),
-        }
-    }
-}
-
 /// The pieces of work.
 pub trait Works: Debug + Send + Sync {
     /// An upload becomes a paint; `ended` hears of each stage when it is over.
     ///
     /// # Errors
     ///
-    /// [`WorkError`] for an upload that is no measurement.
+    /// [`WorkshopError`] for an upload that is no measurement.
     fn ingest(
         &self,
         upload: &Path,
         order: &IngestOrder,
         progress: Progress<'_>,
         ended: &dyn Fn(&'static str),
-    ) -> Result<PaintFile, WorkError>;
+    ) -> Result<PaintFile, WorkshopError>;
 
     /// Paints become a blend.
     ///
     /// # Errors
     ///
-    /// [`WorkError`] for paints that cannot be blended.
+    /// [`WorkshopError`] for paints that cannot be blended.
     fn blend(
         &self,
         paints: &[&PaintFile],
         profile: &Profile,
         progress: Progress<'_>,
-    ) -> Result<Blend, WorkError>;
+    ) -> Result<Blend, WorkshopError>;
 
     /// A paint, or a blend at some weights, becomes a file.
     ///
     /// # Errors
     ///
-    /// [`WorkError`] for weights that are refused.
+    /// [`WorkshopError`] for weights that are refused.
     fn realise(
         &self,
         thing: &Thing,
         weights: Option<&RealisationWeights>,
         format: Format,
         profile: &Profile,
-    ) -> Result<Vec<u8>, WorkError>;
+    ) -> Result<Vec<u8>, WorkshopError>;
 
     /// All paints of a blend become one texture bundle.
     ///
     /// # Errors
     ///
-    /// [`WorkError`] for a thing that is no blend.
-    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError>;
+    /// [`WorkshopError`] for a thing that is no blend.
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkshopError>;
 
     /// A paint, or a blend at some weights, becomes a picture, lit by the environment that the view names.
     ///
     /// # Errors
     ///
-    /// [`WorkError`] for weights or a view that is refused.
+    /// [`WorkshopError`] for weights or a view that is refused.
     fn preview(
         &self,
         thing: &Thing,
@@ -210,15 +174,18 @@ pub trait Works: Debug + Send + Sync {
         environment: Option<&Environment>,
         format: PictureFormat,
         progress: Progress<'_>,
-    ) -> Result<Picture, WorkError>;
+    ) -> Result<Picture, WorkshopError>;
 
     /// A paint is read by a virtual multi-angle instrument, at its own angles where none are given.
     ///
     /// # Errors
     ///
-    /// [`WorkError`] for angles that no instrument reads at.
-    fn readings(&self, paint: &Thing, aspecular_deg: Option<&[f64]>)
-    -> Result<Readings, WorkError>;
+    /// [`WorkshopError`] for angles that no instrument reads at.
+    fn readings(
+        &self,
+        paint: &Thing,
+        aspecular_deg: Option<&[f64]>,
+    ) -> Result<Readings, WorkshopError>;
 
     /// The same as a `CxF3` document.
     ///
@@ -229,28 +196,28 @@ pub trait Works: Debug + Send + Sync {
         &self,
         paint: &Thing,
         aspecular_deg: Option<&[f64]>,
-    ) -> Result<String, WorkError>;
+    ) -> Result<String, WorkshopError>;
 
     /// What a glossmeter reads of a paint.
     ///
     /// # Errors
     ///
-    /// [`WorkError`] for a blend, which has no gloss of its own.
-    fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkError>;
+    /// [`WorkshopError`] for a blend, which has no gloss of its own.
+    fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkshopError>;
 
     /// What some work will take with a profile.
     ///
     /// # Errors
     ///
-    /// [`WorkError`] for what would be refused when it is done.
-    fn estimate(&self, asked: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError>;
+    /// [`WorkshopError`] for what would be refused when it is done.
+    fn estimate(&self, asked: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkshopError>;
 
     /// The profile that meets a target on some work.
     ///
     /// # Errors
     ///
-    /// [`WorkError`] for a target that is none, and what would be refused when the work is done.
-    fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkError>;
+    /// [`WorkshopError`] for a target that is none, and what would be refused when the work is done.
+    fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkshopError>;
 
     /// What is known about a paint or a blend.
     fn describe(&self, thing: &Thing) -> Value;

@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Asked, Estimate, Fault, Format, Gloss, IngestOrder, Picked, Picture, PictureFormat, Progress,
-    Readings, Target, Thing, View, WorkError, Works,
+    Asked, Estimate, Format, Gloss, IngestOrder, Picked, Picture, PictureFormat, Progress,
+    Readings, Target, Thing, View, Works,
 };
 use crate::accuracy::Profile;
 use crate::blend::{Blend, RealisationWeights};
@@ -27,22 +27,6 @@ impl Workshop {
     #[must_use]
     pub const fn new(limits: Limits) -> Self {
         Self { limits }
-    }
-}
-
-impl From<WorkshopError> for WorkError {
-    fn from(error: WorkshopError) -> Self {
-        let fault = match error.fault {
-            workshop::Fault::Usage => Fault::Request,
-            workshop::Fault::Input => Fault::Upload,
-            workshop::Fault::Output | workshop::Fault::Internal => Fault::Internal,
-        };
-        Self {
-            fault,
-            field: error.field,
-            inside: error.inside,
-            message: error.message,
-        }
     }
 }
 
@@ -103,10 +87,10 @@ impl Workshop {
 }
 
 /// What an instrument can be held against.
-fn paint_of(thing: &Thing) -> Result<&PaintFile, WorkError> {
+fn paint_of(thing: &Thing) -> Result<&PaintFile, WorkshopError> {
     match thing {
         Thing::Paint(paint) => Ok(paint),
-        Thing::Blend(_) => Err(WorkshopError::internal("a blend is not read").into()),
+        Thing::Blend(_) => Err(WorkshopError::internal("a blend is not read")),
     }
 }
 
@@ -128,9 +112,9 @@ impl Works for Workshop {
         order: &IngestOrder,
         progress: Progress<'_>,
         ended: &dyn Fn(&'static str),
-    ) -> Result<PaintFile, WorkError> {
+    ) -> Result<PaintFile, WorkshopError> {
         let options = self.options(order);
-        Ok(workshop::ingest_upload(upload, &options, progress, ended)?)
+        workshop::ingest_upload(upload, &options, progress, ended)
     }
 
     fn blend(
@@ -138,7 +122,7 @@ impl Works for Workshop {
         paints: &[&PaintFile],
         profile: &Profile,
         progress: Progress<'_>,
-    ) -> Result<Blend, WorkError> {
+    ) -> Result<Blend, WorkshopError> {
         Ok(workshop::blend_paints(paints, profile, progress)?.blend)
     }
 
@@ -148,11 +132,11 @@ impl Works for Workshop {
         weights: Option<&RealisationWeights>,
         format: Format,
         profile: &Profile,
-    ) -> Result<Vec<u8>, WorkError> {
+    ) -> Result<Vec<u8>, WorkshopError> {
         Ok(workshop::realise(thing, weights, format, profile)?.bytes)
     }
 
-    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkError> {
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkshopError> {
         Ok(workshop::bundle_blend(blend, profile)?.bytes)
     }
 
@@ -164,7 +148,7 @@ impl Works for Workshop {
         environment: Option<&Environment>,
         format: PictureFormat,
         progress: Progress<'_>,
-    ) -> Result<Picture, WorkError> {
+    ) -> Result<Picture, WorkshopError> {
         let options = options_of(view, environment);
         let made = workshop::preview(thing, weights, &options, format, &self.limits, progress)?;
         let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
@@ -188,31 +172,28 @@ impl Works for Workshop {
         &self,
         paint: &Thing,
         aspecular_deg: Option<&[f64]>,
-    ) -> Result<Readings, WorkError> {
-        Ok(workshop::readings(paint_of(paint)?, aspecular_deg)?)
+    ) -> Result<Readings, WorkshopError> {
+        workshop::readings(paint_of(paint)?, aspecular_deg)
     }
 
     fn readings_document(
         &self,
         paint: &Thing,
         aspecular_deg: Option<&[f64]>,
-    ) -> Result<String, WorkError> {
-        Ok(workshop::readings_document(
-            paint_of(paint)?,
-            aspecular_deg,
-        )?)
+    ) -> Result<String, WorkshopError> {
+        workshop::readings_document(paint_of(paint)?, aspecular_deg)
     }
 
-    fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkError> {
+    fn gloss(&self, paint: &Thing) -> Result<Gloss, WorkshopError> {
         Ok(workshop::gloss(paint_of(paint)?))
     }
 
-    fn estimate(&self, asked: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkError> {
-        Ok(self.with_work(asked, |work| work.estimate(profile))?)
+    fn estimate(&self, asked: &Asked<'_>, profile: &Profile) -> Result<Estimate, WorkshopError> {
+        self.with_work(asked, |work| work.estimate(profile))
     }
 
-    fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkError> {
-        Ok(self.with_work(asked, |work| target.pick(work))?)
+    fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkshopError> {
+        self.with_work(asked, |work| target.pick(work))
     }
 
     fn describe(&self, thing: &Thing) -> Value {
