@@ -102,13 +102,17 @@ pub(super) fn mix_boxes(flakes: &BlendedFlakes, weights: &[[f64; 3]], out: &mut 
     }
 }
 
-/// Sums in 64 bits, every number ordered and held.
-fn wide(paints: &[Boxes], weights: &[[f64; 3]], out: &mut Boxes) -> Account {
-    let mut account = Account::default();
-    let clusters = paints.first().map_or(0, |own| own.lower.len());
+/// Lists of so many corners, whatever they are.
+fn make_room(out: &mut Boxes, clusters: usize) {
     for list in [&mut out.lower, &mut out.upper] {
         list.resize(clusters, [0.0; 3]);
     }
+}
+
+/// Sums in 64 bits, every number ordered and held.
+fn wide(paints: &[Boxes], weights: &[[f64; 3]], out: &mut Boxes) -> Account {
+    let mut account = Account::default();
+    make_room(out, paints.first().map_or(0, |own| own.lower.len()));
     for (k, (low, high)) in out.lower.iter_mut().zip(&mut out.upper).enumerate() {
         for axis in 0..3 {
             let mut pair = [0.0; 2];
@@ -135,6 +139,7 @@ fn narrow<const PAINTS: usize>(
         return blocks(paints, &weights.map(|w| w[0]), leaves, out);
     }
     let patterns: [[f32; BLOCK]; PAINTS] = weights.map(|axes| std::array::from_fn(|k| axes[k % 3]));
+    make_room(out, paints[0].lower.len());
     blocks(paints, &patterns, leaves, out)
 }
 
@@ -148,7 +153,8 @@ fn blocks<const PAINTS: usize>(
     let numbers = paints[0].lower.as_flattened().len();
     let mut lists =
         [&mut out.lower, &mut out.upper].map(|list| std::mem::take(list).into_flattened());
-    // Used memory is written over. New memory would have to be cleared first: it is appended to, list by list.
+    // Used memory is written over. New memory would have to be cleared first: it is appended to, where one weight is for
+    // all axes.
     let over = lists.iter().all(|list| list.len() == numbers);
     if !over {
         for list in &mut lists {
@@ -162,17 +168,23 @@ fn blocks<const PAINTS: usize>(
             paints.map(|own| &own.lower.as_flattened()[here.clone()]),
             paints.map(|own| &own.upper.as_flattened()[here.clone()]),
         ];
-        if !over {
-            append_sums(weights, lower, &mut lists[0]);
-            append_sums(weights, upper, &mut lists[1]);
-        }
-        let [low, high] = lists.each_mut().map(|list| &mut list[here.clone()]);
-        let (ordered, beyond) = match (over, leaves) {
-            (true, true) => sums::<PAINTS, true>(weights, lower, upper, low, high),
-            (true, false) => sums::<PAINTS, false>(weights, lower, upper, low, high),
-            (false, true) => looked_at::<true>(low, high),
-            (false, false) => looked_at::<false>(low, high),
+        let looked = if over {
+            let [low, high] = lists.each_mut().map(|list| &mut list[here.clone()]);
+            if leaves {
+                sums::<PAINTS, true>(weights, lower, upper, low, high)
+            } else {
+                sums::<PAINTS, false>(weights, lower, upper, low, high)
+            }
+        } else {
+            let weights = weights.each_ref().map(|weight| weight.at(0));
+            if leaves {
+                append_sums::<PAINTS, true>(weights, lower, upper, &mut lists)
+            } else {
+                append_sums::<PAINTS, false>(weights, lower, upper, &mut lists)
+            }
         };
+        let (ordered, beyond) = looked;
+        let [low, high] = lists.each_mut().map(|list| &mut list[here.clone()]);
         if beyond {
             for (low, high) in low.iter_mut().zip(high) {
                 [*low, *high] = account.mended([*low, *high].map(f64::from));
@@ -191,29 +203,38 @@ fn corner_by_corner(numbers: Vec<f32>) -> Vec<[f32; 3]> {
     cast.unwrap_or_else(|(_, numbers)| numbers.as_chunks().0.to_vec())
 }
 
-/// Appends one corner of a block of at most [`BLOCK`] numbers to a list.
+/// What [`sums`] does, at the end of two lists. Two paints are summed on their way, each further one on top of them.
 #[inline(never)]
-fn append_sums<const PAINTS: usize>(
-    weights: &[impl Weight; PAINTS],
-    corners: [&[f32]; PAINTS],
-    list: &mut Vec<f32>,
-) {
-    let count = corners[0].len().min(BLOCK);
-    let corners = corners.map(|own| &own[..count]);
-    list.extend((0..count).map(|k| {
-        let mut sum = weights[0].at(k) * corners[0][k];
-        for m in 1..PAINTS {
-            sum += weights[m].at(k) * corners[m][k];
-        }
-        sum
-    }));
-}
-
-/// What [`sums`] says of a block that is summed already.
-#[inline(never)]
-fn looked_at<const WATCH: bool>(low: &[f32], high: &[f32]) -> (bool, bool) {
+fn append_sums<const PAINTS: usize, const WATCH: bool>(
+    weights: [f32; PAINTS],
+    lower: [&[f32]; PAINTS],
+    upper: [&[f32]; PAINTS],
+    [low, high]: &mut [Vec<f32>; 2],
+) -> (bool, bool) {
+    let first = low.len();
+    let (x, y) = (weights[0], weights[1]);
+    let sum = |(own, other): (&f32, &f32)| x * own + y * other;
+    low.extend(lower[0].iter().zip(lower[1]).map(sum));
     let mut seen = Seen::default();
-    for (&l, &h) in low.iter().zip(high) {
+    if PAINTS == 2 {
+        let pairs = upper[0].iter().zip(upper[1]).zip(&low[first..]);
+        high.extend(pairs.map(|(pair, &l)| {
+            let h = sum(pair);
+            seen.look::<WATCH>(l, h);
+            h
+        }));
+        return seen.told();
+    }
+    high.extend(upper[0].iter().zip(upper[1]).map(sum));
+    let (low, high) = (&mut low[first..], &mut high[first..]);
+    for m in 2..PAINTS {
+        for (list, corners) in [(&mut *low, lower[m]), (&mut *high, upper[m])] {
+            for (sum, own) in list.iter_mut().zip(corners) {
+                *sum += weights[m] * own;
+            }
+        }
+    }
+    for (&l, &h) in low.iter().zip(&*high) {
         seen.look::<WATCH>(l, h);
     }
     seen.told()

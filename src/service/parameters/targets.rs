@@ -73,10 +73,7 @@ fn checked(
         max_error,
         max_seconds,
     };
-    target
-        .check()
-        .map(|()| target)
-        .map_err(problem)
+    target.check().map(|()| target).map_err(problem)
 }
 
 /// What is told about a paint or a blend, with what was picked for it.
