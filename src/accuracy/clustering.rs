@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::geometries::{Geometry, geometries, mixed, slices_at};
-use super::sparkle::lit_from;
+use super::sparkle::{lit_from, off_by};
 use crate::color::{Lab, LinearRgb, ciede2000, luminance};
 use crate::fit::{ClusterSettings, Clusterer, SliceClusters, Thinned};
 use crate::measurement::{FlakePictures, SliceRoom};
@@ -18,8 +18,8 @@ use crate::paint::{AngleGrid, CarPaint, ClusteringError, LightnessMixture, Perce
 /// Slices compared besides those around the instrument geometries.
 const SPREAD: usize = 12;
 
-/// Mean luminance (of π f) above which a slice is lit and its relative errors mean something.
-const LIT: f64 = 2e-3 * std::f64::consts::PI;
+/// Mean luminance (of π f) above which a slice is light enough for relative errors to mean something.
+const LIGHT_ENOUGH: f64 = 2e-3 * std::f64::consts::PI;
 
 /// Share of the texels below the sparkle.
 pub(super) const SPARKLE: f64 = 0.999;
@@ -30,7 +30,7 @@ struct Compared {
     pixels: LinearRgb,
     clusters: LinearRgb,
     lightness_w1: f64,
-    /// Relative errors of mean luminance and sparkle, where the slice is lit.
+    /// Relative errors of mean luminance and sparkle, where the slice is light enough.
     relative: Option<[f64; 2]>,
     /// Shares of pixels and of clusters from each geometry's lightness of lit flakes on.
     lit: [[f64; 2]; 6],
@@ -112,8 +112,6 @@ fn compared(
     let of = |get: &dyn Fn(&Compared) -> Option<f64>| {
         Percentiles::of(compared.iter().filter_map(get).collect())
     };
-    let [width, height] = pictures.size();
-    let one_texel = 1.0 / f64::from((width * height).max(1));
     let (mut instrument, mut lit) = ([0.0; 6], [0.0; 6]);
     for (at, geometry) in seen.iter().enumerate() {
         let here = geometry.slices(pictures.theta_h(), pictures.theta_d());
@@ -128,7 +126,7 @@ fn compared(
             geometry.lab(mixed(met().map(|(weight, c)| (weight, c.clusters)))),
         );
         let share = |of: usize| met().map(|(weight, c)| weight * c.lit[at][of]).sum::<f64>();
-        lit[at] = (share(1) - share(0)).abs() / share(0).max(one_texel);
+        lit[at] = off_by(share(1), share(0));
     }
     ClusteringError {
         slices: compared.len(),
@@ -213,7 +211,7 @@ fn compare(
     let clusters = mixed(parts.iter().map(|(weight, slice)| (*weight, slice.mean())));
     let mixture = LightnessMixture::of(&parts);
     let mean = std::f64::consts::PI * luminance(pixels);
-    let relative = (mean > LIT).then(|| {
+    let relative = (mean > LIGHT_ENOUGH).then(|| {
         let sparkle = luminance_of(percentile(&lightness, SPARKLE));
         [
             (std::f64::consts::PI * luminance(clusters) / mean - 1.0).abs(),

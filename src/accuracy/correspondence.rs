@@ -62,7 +62,7 @@ pub fn blend_deviation(
             } else {
                 0.0
             },
-            lit: off_by(found.lit, best.lit),
+            lit: Some(off_by(found.lit, best.lit)),
         });
     }
     Ok(deviations)

@@ -9,9 +9,9 @@
 //! error = W1(pixels, clusters) + (cost − dual bound) + W1(slices left out, mixtures) + W1(box, rounded box)
 //! ```
 //!
-//! What instrument and eye would notice stands beside it, at the six instrument geometries: color, lit flakes, sparkle.
-//! Every step measures it against the one before, and the steps' figures are added up, which is no bound: errors that go
-//! the same way are rare, and those that cancel are counted twice.
+//! What instrument and eye would notice stands beside it: color and lit flakes at the six instrument geometries, and
+//! sparkle. Every step measures it against the one before, and the steps' figures are added up, which is no bound. It is
+//! measured at weights within the paints, and told of no others.
 //!
 //! The reference profile's transport and files have none of the last three. A realisation outside the paints multiplies
 //! the first two by the sum of the weights' sizes.
@@ -42,7 +42,7 @@ pub struct SeenError {
     pub aspecular_deg: [f64; 6],
     /// CIEDE2000 of the mean color at each.
     pub delta_e_2000: [f64; 6],
-    /// Relative error of how many flakes are lit at each.
+    /// Relative error of how many flakes are lit at each, fewer than one texel in a thousand counted as that many.
     pub lit: [f64; 6],
     /// Relative error of the 99.9th percentile of the flakes' luminance: of clusters nine of ten compared slices are
     /// within, of transport and file it is the worst geometry.
@@ -77,7 +77,14 @@ impl ResultError {
         }
     }
 
-    /// The same beyond the paints: every term times the sum of the weights' sizes, at least 1.
+    /// The same of a file that shows something else than the paint.
+    #[must_use]
+    pub fn unseen(self) -> Self {
+        Self { seen: None, ..self }
+    }
+
+    /// The same beyond the paints: every term times the sum of the weights' sizes, at least 1; what would be seen was not
+    /// measured there.
     #[must_use]
     pub fn stretched(&self, sum_of_sizes: f64) -> Self {
         let by = sum_of_sizes.max(1.0);
@@ -89,12 +96,7 @@ impl ResultError {
                     ..*term
                 })
                 .collect(),
-            self.seen.map(|seen| SeenError {
-                delta_e_2000: seen.delta_e_2000.map(|error| error * by),
-                lit: seen.lit.map(|error| error * by),
-                sparkle: seen.sparkle * by,
-                ..seen
-            }),
+            self.seen.filter(|_| by <= 1.0 + WITHIN),
         )
     }
 }
@@ -123,7 +125,22 @@ impl SeenError {
         }
     }
 
-    /// With what another step adds at each geometry; nothing, where it added nothing.
+    /// With what another transport than the exact one adds; that lists nothing.
+    fn and_transport(self, deviations: &[BlendDeviation]) -> Option<Self> {
+        if deviations.is_empty() {
+            return Some(self);
+        }
+        let at = |angle: f64| deviations.iter().find(|own| own.aspecular_deg == angle);
+        let each = self.aspecular_deg.map(at).into_iter();
+        let each = each.collect::<Option<Vec<&BlendDeviation>>>()?;
+        let lit = each.iter().map(|own| own.lit);
+        let lit = lit.collect::<Option<Vec<f64>>>()?;
+        let color: Vec<f64> = each.iter().map(|own| own.delta_e_2000).collect();
+        let sparkle: Vec<f64> = each.iter().map(|own| own.sparkle).collect();
+        Some(self.and(&color, &lit, &sparkle))
+    }
+
+    /// With what another step adds at each geometry.
     fn and(self, delta_e_2000: &[f64], lit: &[f64], sparkle: &[f64]) -> Self {
         let sum = |x: f64, y: f64| x + y;
         Self {
@@ -141,6 +158,9 @@ fn each(mut all: [f64; 6], others: &[f64], of: impl Fn(f64, f64) -> f64) -> [f64
     }
     all
 }
+
+/// What the sum of weights' sizes of a mixture may be above 1 by rounding.
+const WITHIN: f64 = 1e-9;
 
 const SEEN: &str = "measured step by step and added up: clusters against pixels, of several paints the worst; a blend against exact \
                     transport, at equal weights; a file against the paint";
@@ -212,12 +232,8 @@ pub fn blend_error(blend: &Blend) -> ResultError {
     }));
     let each = with_flakes.map(|(_, clustering)| SeenError::of_clusters(clustering));
     let seen = each.reduce(|x, y| Some(x?.or_worse(y?))).flatten();
-    // Exact transport of the distance, from which nothing deviates, lists nothing.
-    let by = |get: fn(&BlendDeviation) -> f64| -> Vec<f64> {
-        report.against_exact.iter().map(get).collect()
-    };
-    let (color, lit, top) = (by(|d| d.delta_e_2000), by(|d| d.lit), by(|d| d.sparkle));
-    ResultError::of(terms, seen.map(|seen| seen.and(&color, &lit, &top)))
+    let seen = seen.and_then(|seen| seen.and_transport(&report.against_exact));
+    ResultError::of(terms, seen)
 }
 
 /// Error of a file written from a paint or a blend of this error.
@@ -269,5 +285,101 @@ fn clusters<'a>(of: impl Iterator<Item = Option<&'a Clustering>>) -> Term {
         what: "clusters",
         lab: worst,
         how,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paint::{ClusteringError, Percentiles};
+
+    fn clustering(color: f64, lit: Option<f64>, sparkle: f64) -> Clustering {
+        let at_p90 = |p90| Percentiles {
+            p90,
+            ..Percentiles::default()
+        };
+        Clustering {
+            clusters: 50,
+            box_rule: "moments".to_owned(),
+            angle_step: 1,
+            w1_bound: None,
+            left_out_w1: None,
+            error: Some(ClusteringError {
+                slices: 20,
+                of: 100,
+                lightness_w1: at_p90(0.3),
+                mean_luminance: Percentiles::default(),
+                sparkle: at_p90(sparkle),
+                instrument: [color; 6],
+                lit: lit.map(|lit| [lit; 6]),
+            }),
+            realised_lab: None,
+        }
+    }
+
+    fn seen(clustering: &Clustering) -> Option<SeenError> {
+        SeenError::of_clusters(Some(clustering))
+    }
+
+    fn deviations(lit: Option<f64>) -> Vec<BlendDeviation> {
+        // In another order than the geometries'.
+        ASPECULAR_DEG
+            .iter()
+            .rev()
+            .map(|&aspecular_deg| BlendDeviation {
+                aspecular_deg,
+                delta_e_2000: aspecular_deg.abs(),
+                sparkle: 0.01,
+                lit,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn what_was_not_measured_is_not_told() {
+        assert!(SeenError::of_clusters(None).is_none());
+        assert!(seen(&clustering(0.1, None, 0.0)).is_none());
+        let thinned = Clustering {
+            left_out_w1: Some(Percentiles::default()),
+            ..clustering(0.1, Some(0.1), 0.0)
+        };
+        assert!(seen(&thinned).is_none());
+        let whole = seen(&clustering(0.1, Some(0.1), 0.0)).expect("measured");
+        assert!(whole.and_transport(&deviations(None)).is_none());
+        assert!(whole.and_transport(&deviations(Some(0.0))[1..]).is_none());
+        assert_eq!(whole.and_transport(&[]), Some(whole));
+    }
+
+    #[test]
+    fn the_worst_paint_counts_and_steps_add_up_geometry_by_geometry() {
+        let first = seen(&clustering(0.1, Some(0.3), 0.02)).expect("measured");
+        let second = seen(&clustering(0.2, Some(0.1), 0.01)).expect("measured");
+        let worse = first.or_worse(second);
+        assert_eq!(
+            (worse.delta_e_2000, worse.lit, worse.sparkle),
+            ([0.2; 6], [0.3; 6], 0.02)
+        );
+        let blended = worse
+            .and_transport(&deviations(Some(0.5)))
+            .expect("measured");
+        assert_eq!(
+            blended.delta_e_2000,
+            ASPECULAR_DEG.map(|angle| 0.2 + angle.abs())
+        );
+        assert_eq!((blended.lit, blended.sparkle), ([0.8; 6], 0.03));
+        let writing = WritingError {
+            rounding_w1: 0.05,
+            instrument: vec![1.0; 6],
+            sparkle: vec![0.0, 0.0, 0.07, 0.0, 0.0, 0.0],
+            lit: vec![0.1; 6],
+            inverse_cdf_loss: None,
+        };
+        let of = ResultError::of(Vec::new(), Some(worse));
+        let file = file_error(&of, Some(&writing));
+        let seen = file.seen.expect("measured");
+        assert_eq!((seen.delta_e_2000, file.lab), ([1.2; 6], Some(0.05)));
+        assert!((seen.lit[3] - 0.4).abs() < 1e-12 && (seen.sparkle - 0.09).abs() < 1e-12);
+        assert!(of.stretched(1.0).seen.is_some() && of.stretched(1.6).seen.is_none());
+        assert!(of.unseen().seen.is_none());
     }
 }

@@ -43,9 +43,12 @@ pub(super) fn lit_from(geometry: &Geometry, mean: LinearRgb) -> f64 {
     lightness_of(2.0 * (base + mean) - base)
 }
 
-/// By which part the share of lit flakes is off; less than one in a million is counted as that.
+/// Share of lit texels below which flakes are too rare to count: fewer count as that many.
+const COUNTED: f64 = 1e-3;
+
+/// By which part the share of lit flakes is off.
 pub(super) fn off_by(share: f64, exact: f64) -> f64 {
-    (share - exact).abs() / exact.max(1e-6)
+    (share - exact).abs() / exact.max(COUNTED)
 }
 
 fn at(geometry: &Geometry, flakes: &Flakes) -> Sparkle {
@@ -63,5 +66,18 @@ fn at(geometry: &Geometry, flakes: &Flakes) -> Sparkle {
         aspecular_deg: geometry.aspecular_deg,
         luminance: SHARES.map(|share| luminance_of(mixture.quantile(share))),
         lit_per_mm2: lit * 1e6 / (cell_um * cell_um),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rare_flakes_are_off_by_no_more_than_they_can_be_counted() {
+        assert_eq!(off_by(0.01, 0.01), 0.0);
+        assert!((off_by(0.03, 0.02) - 0.5).abs() < 1e-12);
+        assert!((off_by(1e-4, 0.0) - 0.1).abs() < 1e-12);
+        assert!((off_by(0.0, 5e-4) - 0.5).abs() < 1e-12);
     }
 }

@@ -20,7 +20,7 @@ pub struct WritingError {
     pub instrument: Vec<f64>,
     /// Relative change of the 99.9th percentile of luminance at each geometry.
     pub sparkle: Vec<f64>,
-    /// Relative change of how many flakes are lit at each geometry.
+    /// Relative change of how many flakes are lit at each geometry, fewer than one texel in a thousand counted as that many.
     pub lit: Vec<f64>,
     /// Largest share of draws that show another cluster than they should, where flakes are drawn by the 500 steps.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -5,10 +5,10 @@
 //! ```
 //!
 //! One pass reads every corner once and writes both corners of the sum; the number of paints is known to the compiler,
-//! so that the loop is as plain as `a·X + b·Y`. On the way the signs of `l' − l` are gathered: only a block in which
-//! extrapolation turned a box inside out is gone through again, number by number, to put its corners in order. Whether
-//! a sum can leave ±[`MAX_LAB`] at all follows from the weights and the farthest corner, before anything is summed; if
-//! it can, a block that left is gone through in the same way. Where a weight is large, every number is summed in 64 bits.
+//! so that the loop is as plain as `a·X + b·Y`. Only where a weight is negative can a box turn inside out: there its
+//! corners are put in order on the way. Whether a sum can leave ±[`MAX_LAB`] at all follows from the weights and the
+//! farthest corner, before anything is summed; if it can, a block that left is gone through again, number by number. Where
+//! a weight is large, every number is summed in 64 bits.
 //! Boxes are not clamped to `L >= 0`, because the light they stand for is clamped once, when it is evaluated.
 
 use super::clamp::Ledger;
@@ -58,19 +58,10 @@ impl Account {
         [low, high].map(|v| v.clamp(-MAX_LAB, MAX_LAB) as f32)
     }
 
-    /// Orders the numbers of a block whose magnitude is known to be in range.
-    fn put_in_order(&mut self, low: &mut [f32], high: &mut [f32]) {
-        let (mut inverted, mut widest) = (0_u32, 0_i32);
-        for (low, high) in low.iter_mut().zip(high) {
-            let (l, h) = (*low, *high);
-            let turned = h < l;
-            inverted += u32::from(turned);
-            // Positive differences compare like their bits, and above all others.
-            widest = widest.max((l - h).to_bits().cast_signed());
-            (*low, *high) = if turned { (h, l) } else { (l, h) };
-        }
-        self.inverted += inverted as usize;
-        let widest = f32::from_bits(widest.cast_unsigned());
+    /// Counts what was put in order on its way.
+    fn turned(&mut self, seen: &Seen) {
+        self.inverted += seen.inverted as usize;
+        let widest = f32::from_bits(seen.widest.cast_unsigned());
         self.narrowest = self.narrowest.min(-f64::from(widest));
     }
 }
@@ -135,18 +126,24 @@ fn narrow<const PAINTS: usize>(
 ) -> Account {
     #[allow(clippy::cast_possible_truncation)] // moderate weights of texels
     let weights: [[f32; 3]; PAINTS] = std::array::from_fn(|m| weights[m].map(|w| w as f32));
+    // Weights that are not negative keep corners in order, for rounding does.
+    let turns = weights.as_flattened().iter().any(|w| *w < 0.0);
     if weights.iter().all(|w| *w == [w[0]; 3]) {
-        return blocks(paints, &weights.map(|w| w[0]), leaves, out);
+        let weights = weights.map(|w| w[0]);
+        if turns {
+            make_room(out, paints[0].lower.len());
+        }
+        return blocks(paints, &weights, [leaves, turns], out);
     }
     let patterns: [[f32; BLOCK]; PAINTS] = weights.map(|axes| std::array::from_fn(|k| axes[k % 3]));
     make_room(out, paints[0].lower.len());
-    blocks(paints, &patterns, leaves, out)
+    blocks(paints, &patterns, [leaves, turns], out)
 }
 
 fn blocks<const PAINTS: usize>(
     paints: [&Boxes; PAINTS],
     weights: &[impl Weight; PAINTS],
-    leaves: bool,
+    [leaves, turns]: [bool; 2],
     out: &mut Boxes,
 ) -> Account {
     let mut account = Account::default();
@@ -154,7 +151,7 @@ fn blocks<const PAINTS: usize>(
     let mut lists =
         [&mut out.lower, &mut out.upper].map(|list| std::mem::take(list).into_flattened());
     // Used memory is written over. New memory would have to be cleared first: it is appended to, where one weight is for
-    // all axes.
+    // all axes and none is negative.
     let over = lists.iter().all(|list| list.len() == numbers);
     if !over {
         for list in &mut lists {
@@ -168,12 +165,21 @@ fn blocks<const PAINTS: usize>(
             paints.map(|own| &own.lower.as_flattened()[here.clone()]),
             paints.map(|own| &own.upper.as_flattened()[here.clone()]),
         ];
-        let looked = if over {
-            let [low, high] = lists.each_mut().map(|list| &mut list[here.clone()]);
-            if leaves {
-                sums::<PAINTS, true>(weights, lower, upper, low, high)
-            } else {
-                sums::<PAINTS, false>(weights, lower, upper, low, high)
+        let beyond = if over {
+            let out = lists.each_mut().map(|list| &mut list[here.clone()]);
+            match (leaves, turns) {
+                (true, true) => {
+                    sums::<PAINTS, true, true>(weights, lower, upper, out, &mut account)
+                }
+                (true, false) => {
+                    sums::<PAINTS, true, false>(weights, lower, upper, out, &mut account)
+                }
+                (false, true) => {
+                    sums::<PAINTS, false, true>(weights, lower, upper, out, &mut account)
+                }
+                (false, false) => {
+                    sums::<PAINTS, false, false>(weights, lower, upper, out, &mut account)
+                }
             }
         } else {
             let weights = weights.each_ref().map(|weight| weight.at(0));
@@ -183,14 +189,11 @@ fn blocks<const PAINTS: usize>(
                 append_sums::<PAINTS, false>(weights, lower, upper, &mut lists)
             }
         };
-        let (ordered, beyond) = looked;
         let [low, high] = lists.each_mut().map(|list| &mut list[here.clone()]);
         if beyond {
             for (low, high) in low.iter_mut().zip(high) {
                 [*low, *high] = account.mended([*low, *high].map(f64::from));
             }
-        } else if !ordered {
-            account.put_in_order(low, high);
         }
     }
     [out.lower, out.upper] = lists.map(corner_by_corner);
@@ -210,7 +213,7 @@ fn append_sums<const PAINTS: usize, const WATCH: bool>(
     lower: [&[f32]; PAINTS],
     upper: [&[f32]; PAINTS],
     [low, high]: &mut [Vec<f32>; 2],
-) -> (bool, bool) {
+) -> bool {
     let first = low.len();
     let (x, y) = (weights[0], weights[1]);
     let sum = |(own, other): (&f32, &f32)| x * own + y * other;
@@ -220,10 +223,9 @@ fn append_sums<const PAINTS: usize, const WATCH: bool>(
         let pairs = upper[0].iter().zip(upper[1]).zip(&low[first..]);
         high.extend(pairs.map(|(pair, &l)| {
             let h = sum(pair);
-            seen.look::<WATCH>(l, h);
-            h
+            seen.look::<WATCH, false>(l, h).1
         }));
-        return seen.told();
+        return seen.is_beyond();
     }
     high.extend(upper[0].iter().zip(upper[1]).map(sum));
     let (low, high) = (&mut low[first..], &mut high[first..]);
@@ -234,34 +236,44 @@ fn append_sums<const PAINTS: usize, const WATCH: bool>(
             }
         }
     }
-    for (&l, &h) in low.iter().zip(&*high) {
-        seen.look::<WATCH>(l, h);
+    if WATCH {
+        for (&l, &h) in low.iter().zip(&*high) {
+            seen.look::<WATCH, false>(l, h);
+        }
     }
-    seen.told()
+    seen.is_beyond()
 }
 
 /// What is gathered of sums on their way.
 #[derive(Default)]
 struct Seen {
-    signs: u32,
     beyond: u32,
+    inverted: u32,
+    widest: i32,
 }
 
 impl Seen {
+    /// Looks at the corners of a box; gives them back, if it may `TURN` inside out, in order.
     #[inline(always)]
-    fn look<const WATCH: bool>(&mut self, l: f32, h: f32) {
-        self.signs |= (h - l).to_bits();
+    fn look<const WATCH: bool, const TURN: bool>(&mut self, l: f32, h: f32) -> (f32, f32) {
         if WATCH {
             // Magnitudes compare like their bits: the sign says whether one is beyond the bound.
             self.beyond |= BOUND.wrapping_sub(l.to_bits() & MAGNITUDE);
             self.beyond |= BOUND.wrapping_sub(h.to_bits() & MAGNITUDE);
         }
+        if !TURN {
+            return (l, h);
+        }
+        let turned = h < l;
+        self.inverted += u32::from(turned);
+        // Positive differences compare like their bits, and above all others.
+        self.widest = self.widest.max((l - h).to_bits().cast_signed());
+        if turned { (h, l) } else { (l, h) }
     }
 
-    /// Whether no box is inside out, and whether a number is beyond.
-    #[inline(always)]
-    fn told(&self) -> (bool, bool) {
-        (self.signs >> 31 == 0, self.beyond >> 31 == 1)
+    /// Whether a number is beyond ±[`MAX_LAB`], if that was watched.
+    const fn is_beyond(&self) -> bool {
+        self.beyond >> 31 == 1
     }
 }
 
@@ -284,18 +296,17 @@ impl Weight for [f32; BLOCK] {
     }
 }
 
-/// Both corners of a block of at most [`BLOCK`] numbers, whether no box is inside out, and, if `WATCH`ed,
-/// whether a number is beyond ±[`MAX_LAB`].
+/// Both corners of a block of at most [`BLOCK`] numbers, and what [`Seen::is_beyond`] says of them.
 ///
 /// A function of its own: its two outputs are known to be apart from everything else, so that the loop becomes vectors.
 #[inline(never)]
-fn sums<const PAINTS: usize, const WATCH: bool>(
+fn sums<const PAINTS: usize, const WATCH: bool, const TURN: bool>(
     weights: &[impl Weight; PAINTS],
     lower: [&[f32]; PAINTS],
     upper: [&[f32]; PAINTS],
-    low: &mut [f32],
-    high: &mut [f32],
-) -> (bool, bool) {
+    [low, high]: [&mut [f32]; 2],
+    account: &mut Account,
+) -> bool {
     let count = low.len().min(BLOCK);
     let (low, high) = (&mut low[..count], &mut high[..count]);
     let (lower, upper) = (lower.map(|l| &l[..count]), upper.map(|u| &u[..count]));
@@ -307,10 +318,12 @@ fn sums<const PAINTS: usize, const WATCH: bool>(
             l += weights[m].at(k) * lower[m][k];
             h += weights[m].at(k) * upper[m][k];
         }
-        seen.look::<WATCH>(l, h);
-        (low[k], high[k]) = (l, h);
+        (low[k], high[k]) = seen.look::<WATCH, TURN>(l, h);
     }
-    seen.told()
+    if TURN {
+        account.turned(&seen);
+    }
+    seen.is_beyond()
 }
 
 #[cfg(test)]
@@ -397,15 +410,44 @@ mod tests {
         assert_eq!(account, Account::default());
     }
 
+    /// Two to five paints; weights that may turn boxes and such that may not; sums that leave the range and that do not.
     #[test]
     fn lists_that_were_used_before_give_the_same() {
-        let paints = || vec![boxes(500, 0.0), boxes(500, 1.0)];
-        let weights = [[1.4; 3], [-0.4; 3]];
-        let fresh = mixed(paints(), &weights);
-        for used in [3, 500, 2000] {
-            let mut out = boxes(used, 7.0);
-            let account = mix_boxes(&flakes(paints()), &weights, &mut out);
-            assert_eq!((out, account), fresh);
+        for (count, paints) in [(500, 2), (999, 3), (256, 4), (1000, 5)] {
+            for (share, first) in [(0.3, 0.4), (-0.4, 1.9), (1.2, 0.9)] {
+                for far in [0.0_f32, 980.0] {
+                    let all = || -> Vec<Boxes> {
+                        let moved = |m: usize| {
+                            let mut own = boxes(count, m as f32);
+                            for corner in own.lower.iter_mut().chain(&mut own.upper) {
+                                *corner = corner.map(|v| v + far);
+                            }
+                            own
+                        };
+                        (0..paints).map(moved).collect()
+                    };
+                    let mut weights = vec![[share; 3]; paints];
+                    weights[0] = [first; 3];
+                    let fresh = mixed(all(), &weights);
+                    let leaves = fresh.1.beyond > 0;
+                    let sum = first + share * (paints - 1) as f64;
+                    assert_eq!(leaves, sum * f64::from(far) > 2000.0, "{sum} {far}");
+                    for used in [3, count, 2000] {
+                        let mut out = boxes(used, 7.0);
+                        let account = mix_boxes(&flakes(all()), &weights, &mut out);
+                        assert_eq!((&out, &account), (&fresh.0, &fresh.1));
+                    }
+                    for k in 0..count {
+                        for axis in 0..3 {
+                            let plain = plainly(&all(), &weights, k, axis);
+                            let own = [fresh.0.lower[k][axis], fresh.0.upper[k][axis]];
+                            // Five products and sums of at most 1.9 · 1000.
+                            let close = |(x, y): (f32, f64)| (f64::from(x) - y).abs() < 5e-3;
+                            assert!(own.into_iter().zip(plain).all(close), "{own:?} {plain:?}");
+                        }
+                    }
+                }
+            }
         }
     }
 

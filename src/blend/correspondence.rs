@@ -40,9 +40,10 @@ pub struct BlendDeviation {
     pub delta_e_2000: f64,
     /// Relative difference of the 99.9th percentile of the flakes' luminance.
     pub sparkle: f64,
-    /// Relative difference of how many flakes are lit.
-    #[serde(default)]
-    pub lit: f64,
+    /// Relative difference of how many flakes are lit, fewer than one texel in a thousand counted as that many; `None` by
+    /// versions that did not count them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lit: Option<f64>,
 }
 
 /// How good a correspondence is.

@@ -16,7 +16,7 @@ use crate::workshop::{StudyOptions, WorkshopError, study};
 /// minute on two processors. A service whose data folder holds study.json serves it at /v1/accuracy.
 #[derive(Args, Clone, Debug)]
 pub struct Study {
-    /// Two paints or more; the first two are blended.
+    /// Two paints or more; the first two are blended, the first three joined.
     #[arg(value_name = "PAINT")]
     paints: Vec<String>,
     /// Folder to write into; created if it is not there.

@@ -80,13 +80,13 @@ pub struct ClusteringError {
     pub of: usize,
     /// Distance W1 of the lightnesses, Lab units, exact; what W1 in all three axes is at least.
     pub lightness_w1: Percentiles,
-    /// Relative error of the mean luminance, over the lit slices among them.
+    /// Relative error of the mean luminance, over the slices among them that are light enough.
     pub mean_luminance: Percentiles,
-    /// Relative error of the 99.9th percentile of luminance, over the lit slices among them.
+    /// Relative error of the 99.9th percentile of luminance, over the slices among them that are light enough.
     pub sparkle: Percentiles,
     /// CIEDE2000 at the six instrument geometries between the means of clusters and pixels, base included.
     pub instrument: [f64; 6],
-    /// Relative error at those geometries of how many flakes are lit; pictures without any count as having one texel.
+    /// Relative error at those geometries of how many flakes are lit, fewer than one texel in a thousand counted as that many.
     /// `None` by versions that did not count them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lit: Option<[f64; 6]>,

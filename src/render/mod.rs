@@ -125,7 +125,7 @@ pub fn render(
         });
     let film = Film::new(width, height, scene.exposure, pixels);
     let report = RenderReport {
-        sampling: noise::sampling_error(&shader, scene, Some(&film)),
+        sampling: noise::sampling_error(&shader, scene, Some(&film), progress),
         plan,
         samples_per_pixel: scene.samples_per_pixel,
         pixel_mm: pixel_mm(scene),
@@ -145,7 +145,7 @@ pub fn sampling(
 ) -> Result<SamplingError, RenderError> {
     scene.validate(limits)?;
     let (shader, _) = shade::Shader::new(paint, scene);
-    Ok(noise::sampling_error(&shader, scene, None))
+    Ok(noise::sampling_error(&shader, scene, None, &|_| ()))
 }
 
 fn pixel_mm(scene: &Scene) -> f64 {

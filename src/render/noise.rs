@@ -6,8 +6,8 @@
 //! number of flakes under a pixel, samples draw fewer flakes with less contrast.
 //!
 //! FLIP looks at a pixel's neighbourhood, so that whole tiles are drawn again for it. It is no spread that could be halved:
-//! told is the FLIP between the two drawings, which is above that between one and the picture without chance, since they
-//! differ by √2 times as much.
+//! told is the FLIP between the two drawings. They differ by √2 times as much as one from the picture without chance, so
+//! that it is usually above that picture's FLIP.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -26,11 +26,11 @@ const PROBED: u32 = 1024;
 /// At most one of so many pixels is drawn again.
 const LEAST_STRIDE: u32 = 4;
 
-/// Side of a tile that is drawn again, pixels: three times what the eye blurs.
-const TILE: u32 = 16;
+/// Side of a tile that is drawn again, pixels: FLIP's widest filter has 21.
+const TILE: u32 = 32;
 
 /// Most tiles along a side of the picture.
-const MOST_TILES: u32 = 4;
+const MOST_TILES: u32 = 3;
 
 /// What is added to the seed for the second drawing.
 const OTHER: u32 = 0x9e37_79b9;
@@ -44,9 +44,9 @@ pub struct SamplingError {
     pub mean_delta_e: f64,
     /// 95th percentile over them.
     pub p95_delta_e: f64,
-    /// Mean FLIP, 0 to 1, between two drawings of tiles spread over the picture: that of one drawing is less. `None` of
-    /// a picture that is not drawn.
-    pub flip_bound: Option<f64>,
+    /// Mean FLIP, 0 to 1, between two drawings of tiles spread over the picture; usually above that of one drawing.
+    /// `None` of a picture that is not drawn.
+    pub flip_between_drawings: Option<f64>,
 }
 
 /// Draws some pixels again; where there is no picture yet, twice.
@@ -54,6 +54,7 @@ pub(super) fn sampling_error(
     shader: &Shader<'_>,
     scene: &Scene,
     film: Option<&Film>,
+    progress: &(dyn Fn(f32) + Sync),
 ) -> SamplingError {
     let [width, height] = scene.size;
     let mut stride = LEAST_STRIDE;
@@ -76,6 +77,8 @@ pub(super) fn sampling_error(
     let mut errors: Vec<f64> = lattice
         .par_iter()
         .map(|&(x, y)| {
+            // Whoever hears it may call the work off.
+            progress(1.0);
             let [first, again] = drawn_twice(x, y);
             ciede2000(shown(first, scene.exposure), shown(again, scene.exposure))
                 / std::f64::consts::SQRT_2
@@ -91,15 +94,19 @@ pub(super) fn sampling_error(
         pixels: errors.len(),
         mean_delta_e,
         p95_delta_e: errors[errors.len() * 95 / 100],
-        flip_bound: film.map(|_| flip_of_tiles(scene, &drawn_twice)),
+        flip_between_drawings: film.map(|_| flip_of_tiles(scene, &drawn_twice, progress)),
     }
 }
 
 /// Mean FLIP between two drawings, over tiles of the picture.
-fn flip_of_tiles(scene: &Scene, drawn_twice: &(impl Fn(u32, u32) -> [Vec3; 2] + Sync)) -> f64 {
+fn flip_of_tiles(
+    scene: &Scene,
+    drawn_twice: &(impl Fn(u32, u32) -> [Vec3; 2] + Sync),
+    progress: &(dyn Fn(f32) + Sync),
+) -> f64 {
     let [width, height] = scene.size;
     let side = TILE.min(width).min(height);
-    // The same share of small pictures is drawn again as of the lattice.
+    // At least one, however small the picture; a sixteenth of it at most from 256 pixels on.
     let along = |length: u32| (length / (TILE * LEAST_STRIDE)).clamp(1, MOST_TILES);
     let middles = |length: u32| {
         let count = along(length);
@@ -114,6 +121,7 @@ fn flip_of_tiles(scene: &Scene, drawn_twice: &(impl Fn(u32, u32) -> [Vec3; 2] + 
             let (first, again): (Vec<Vec3>, Vec<Vec3>) = (0..side * side)
                 .map(|k| <(Vec3, Vec3)>::from(drawn_twice(left + k % side, top + k / side)))
                 .collect();
+            progress(1.0);
             let tile = |pixels| Film::new(side, side, scene.exposure, pixels);
             flip(&tile(first), &tile(again))
         })

@@ -267,7 +267,7 @@ fn the_stated_chance_of_a_picture_is_its_distance_from_the_truth() {
         "{stated:?} {actual}"
     );
     assert!(truth.report.sampling.mean_delta_e < stated.mean_delta_e / 4.0);
-    let bound = stated.flip_bound.expect("drawn");
+    let bound = stated.flip_between_drawings.expect("drawn");
     let flip = difference(&some.film, &truth.film).flip;
     assert!((1.0..4.0).contains(&(bound / flip)), "{bound} {flip}");
 }

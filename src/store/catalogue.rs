@@ -162,7 +162,7 @@ pub struct JobEnd<'a> {
     /// Why it failed: a JSON object.
     pub problem: Option<&'a str>,
     /// What its stages took: a JSON list.
-    pub stages: Option<&'a str>,
+    pub stages: &'a str,
 }
 
 /// What came of submitting a job.

@@ -307,7 +307,7 @@ fn ended(state: JobState) -> JobEnd<'static> {
     JobEnd {
         state,
         problem: None,
-        stages: None,
+        stages: "[]",
     }
 }
 
@@ -412,7 +412,7 @@ async fn jobs_conform(catalogue: &dyn Catalogue) {
                 "j_1",
                 JobEnd {
                     problem: Some("{}"),
-                    stages: Some("[]"),
+                    stages: "[1]",
                     ..ended(JobState::Failed)
                 },
             )
@@ -430,7 +430,7 @@ async fn jobs_conform(catalogue: &dyn Catalogue) {
     let there = catalogue.job("j_1").await.expect("reads").expect("there");
     assert_eq!(
         (there.problem.as_deref(), there.stages.as_deref()),
-        (Some("{}"), Some("[]"))
+        (Some("{}"), Some("[1]"))
     );
     assert!(
         catalogue

@@ -29,8 +29,7 @@ pub use bundling::bundle_blend;
 pub use describing::{describe_blend, describe_paint};
 pub use error::{Fault, Inside, WorkshopError, accepted};
 pub use estimate::{
-    Estimate, EstimatedError, PictureWork, Stage, Work, known_machine, sample_to_estimate,
-    this_machine,
+    Estimate, EstimatedError, PictureWork, Stage, Work, learn_machine, sample_to_estimate,
 };
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{

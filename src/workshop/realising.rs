@@ -191,7 +191,11 @@ pub fn realise(
         });
     }
     let mut chosen = choose(thing, weights)?;
-    let error = error_of(thing, weights);
+    // Viewers of a GLB see its material, whose own loss stands beside.
+    let error = match format {
+        Format::Glb => error_of(thing, weights).unseen(),
+        _ => error_of(thing, weights),
+    };
     // Only textures are rounded: a GLB and a .paint carry lists as they are.
     let textures = matches!(format, Format::Zip | Format::Json).then_some(&profile.export);
     chosen.report["accuracy"] = accuracy(&error, &chosen.paint, textures);

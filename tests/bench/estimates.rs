@@ -73,6 +73,7 @@ fn main() -> Outcome<()> {
             "realise two.blend --weights 0.3,0.7 --knob precision=f32 --format json",
             "--out x.json",
         ),
+        ("bundle two.blend", "--out x.zip"),
         (
             "preview two.blend --weights 0.5,0.5 --size 256x256",
             "--out x.png",

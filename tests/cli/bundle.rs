@@ -27,6 +27,46 @@ fn a_bundle_meets_a_target_and_tells_its_seconds_and_its_error() {
     let said = json(&desk.ok(&words.split(' ').collect::<Vec<_>>()).stdout);
     assert_eq!(said["picked"]["met"], true, "{said}");
     assert_eq!(said["picked"]["estimate"]["knobs"]["precision"], "8bit");
+    let finer = json(
+        &desk
+            .ok(&[
+                "bundle",
+                "b.blend",
+                "--knob",
+                "precision=f32",
+                "--json",
+                "--out",
+                "f.zip",
+            ])
+            .stdout,
+    );
+    let lab_of = |said: &serde_json::Value| {
+        said["report"]["accuracy"]["error"]["lab"]
+            .as_f64()
+            .expect("known")
+    };
+    let (coarse, fine) = (lab_of(&said), lab_of(&finer));
+    assert!(fine < coarse, "{fine} {coarse}");
+    for (share, met) in [(0.999, true), (0.001, true), (-0.001, false)] {
+        let most = (fine + share * (coarse - fine)).to_string();
+        let words = [
+            "bundle",
+            "b.blend",
+            "--max-error",
+            &most,
+            "--json",
+            "--out",
+            "m.zip",
+        ];
+        let aimed = json(&desk.ok(&words).stdout);
+        assert_eq!(aimed["picked"]["met"], met, "{most}: {aimed}");
+        assert_eq!(
+            lab_of(&aimed) <= fine + share * (coarse - fine),
+            met,
+            "{most}: {aimed}"
+        );
+        assert_ne!(aimed["picked"]["estimate"]["knobs"]["precision"], "8bit");
+    }
     let error = &said["report"]["accuracy"]["error"];
     let terms = error["terms"].as_array().expect("a list");
     let rounding = terms.iter().find(|term| term["what"] == "rounding");

@@ -8,6 +8,27 @@ use crate::house::House;
 use crate::{folder, walk};
 
 #[tokio::test(flavor = "multi_thread")]
+async fn who_waits_for_a_job_is_told_the_seconds_of_its_stages() {
+    let data = folder();
+    let house = House::open(data.path()).await;
+    let (a, b) = (house.paint("silver").await, house.paint("blue").await);
+    let order = json!({ "paints": [a, b] }).to_string();
+    let made = house.post_json("/v1/blends", &order).await;
+    assert_eq!(made.status, 201, "{}", made.text());
+    let timing = made.header("server-timing").expect("stages");
+    for stage in ["waiting", "read", "blend", "store", "job", "total"] {
+        assert!(timing.contains(&format!("{stage};dur=")), "{timing}");
+    }
+    let again = house.post_json("/v1/blends", &order).await;
+    let timing = again.header("server-timing").expect("stages");
+    assert!(
+        again.status == 200 && !timing.contains("read;dur="),
+        "{timing}"
+    );
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn long_work_is_a_job_that_tells_and_can_be_cancelled() {
     let data = folder();
     let house = House::open(data.path()).await;

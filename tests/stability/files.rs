@@ -214,7 +214,7 @@ fn a_report_of_a_blend_with_a_number_that_is_none_is_refused_by_its_place() {
         aspecular_deg: 15.0,
         delta_e_2000: 0.1,
         sparkle: f64::NAN,
-        lit: 0.0,
+        lit: None,
     };
     let spoiled = Clustering {
         realised_lab: Some(f64::INFINITY),

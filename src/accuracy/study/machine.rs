@@ -9,10 +9,8 @@ const EVALUATIONS_OF_A_FIT: f64 = 1.0e7;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Machine {
-    /// Writing a small file durably.
-    pub write: f64,
-    /// Writing each byte beside.
-    pub write_byte: f64,
+    /// Writing a small file durably, and each byte beside; `None` where nothing could be written.
+    pub write: Option<[f64; 2]>,
     /// Reading and hashing a byte of a file that the system has at hand.
     pub hash_byte: f64,
     /// Evaluating a paint at a pair of directions.
@@ -23,15 +21,17 @@ impl Machine {
     /// Whether every figure is a time.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        [self.write, self.write_byte, self.hash_byte, self.evaluation]
+        let written = self.write.iter().flatten();
+        [self.hash_byte, self.evaluation]
             .iter()
+            .chain(written)
             .all(|time| time.is_finite() && *time >= 0.0)
     }
 
-    /// Writing a file of this size durably.
+    /// Writing a file of this size durably, where that is known.
     #[must_use]
-    pub fn write_seconds(&self, bytes: f64) -> f64 {
-        self.write + self.write_byte * bytes
+    pub fn write_seconds(&self, bytes: f64) -> Option<f64> {
+        self.write.map(|[fixed, each]| fixed + each * bytes)
     }
 
     /// Reading and hashing a file of this size.
@@ -44,5 +44,62 @@ impl Machine {
     #[must_use]
     pub fn fit_seconds(&self) -> f64 {
         self.evaluation * EVALUATIONS_OF_A_FIT
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SOUND: Machine = Machine {
+        write: Some([0.01, 1e-9]),
+        hash_byte: 1e-10,
+        evaluation: 1e-7,
+    };
+
+    #[test]
+    fn every_figure_has_to_be_a_time() {
+        assert!(SOUND.is_sound());
+        assert!(
+            Machine {
+                write: None,
+                ..SOUND
+            }
+            .is_sound()
+        );
+        for bad in [-1.0, f64::NAN, f64::INFINITY] {
+            for machine in [
+                Machine {
+                    write: Some([bad, 0.0]),
+                    ..SOUND
+                },
+                Machine {
+                    write: Some([0.0, bad]),
+                    ..SOUND
+                },
+                Machine {
+                    hash_byte: bad,
+                    ..SOUND
+                },
+                Machine {
+                    evaluation: bad,
+                    ..SOUND
+                },
+            ] {
+                assert!(!machine.is_sound(), "{machine:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn seconds_follow_sizes() {
+        assert_eq!(SOUND.write_seconds(1e9), Some(1.01));
+        assert_eq!(SOUND.hash_seconds(1e10), 1.0);
+        assert_eq!(SOUND.fit_seconds(), 1.0);
+        let unknown = Machine {
+            write: None,
+            ..SOUND
+        };
+        assert_eq!(unknown.write_seconds(1.0), None);
     }
 }

@@ -127,11 +127,14 @@ fn of_transport(page: &mut Page, blend: &Blend) {
         page.line(
             "",
             format!(
-                "{:>6}°   ΔE2000 {:.3} to exact transport, sparkle {:+.2} %, lit flakes {:+.2} %",
+                "{:>6}°   ΔE2000 {:.3} to exact transport, sparkle {:.2} %{}",
                 at.aspecular_deg,
                 at.delta_e_2000,
                 100.0 * at.sparkle,
-                100.0 * at.lit
+                at.lit.map_or(String::new(), |lit| format!(
+                    ", lit flakes {:.2} %",
+                    100.0 * lit
+                ))
             ),
         );
     }

@@ -114,7 +114,7 @@ impl Page {
             self.line(
                 "seen",
                 format!(
-                    "at the instrument geometries ΔE2000 up to {:.2}, {:.1} % of the lit flakes, {:.1} % of the sparkle ({})",
+                    "ΔE2000 up to {:.2} and {:.1} % of the lit flakes at the instrument geometries, {:.1} % of the sparkle ({})",
                     worst(&seen.delta_e_2000),
                     100.0 * worst(&seen.lit),
                     100.0 * seen.sparkle,

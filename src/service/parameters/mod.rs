@@ -7,10 +7,12 @@
 mod named;
 pub mod page;
 mod profile;
+mod profile_query;
 pub mod targets;
 pub mod view;
 mod weights;
 
 pub use named::{Named, of_field};
 pub use profile::{KnobsDocument, ProfileDocument, ProfileText};
+pub use profile_query::ProfileQuery;
 pub use weights::WeightQuery;

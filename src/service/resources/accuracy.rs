@@ -15,7 +15,7 @@ const SHIPPED: &str = include_str!("../../../docs/study/study.json");
 #[utoipa::path(
     get, operation_id = "show_accuracy", path = "/v1/accuracy", tag = "accuracy",
     responses(
-        (status = 200, description = "The study: error against time for blending, realising and previewing, growth, presets", body = Object),
+        (status = 200, description = "The study: error against time for ingesting, blending, joining, realising and previewing, growth, presets, this machine's figures", body = Object),
         Problems,
     )
 )]

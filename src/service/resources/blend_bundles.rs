@@ -4,29 +4,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use axum::extract::State;
-use serde::Deserialize;
-use utoipa::IntoParams;
 
 use crate::service::app::App;
-use crate::service::http::{Address, Answer, BlendProblems, Problem, Query};
+use crate::service::http::{Address, Answer, BlendProblems, Problem, ProblemDocument, Query};
 use crate::service::ids;
-use crate::service::parameters::{ProfileText, targets};
+use crate::service::parameters::ProfileQuery;
 use crate::service::work::Asked;
-
-/// How accurately a bundle is written.
-#[derive(Debug, Deserialize, IntoParams)]
-#[into_params(parameter_in = Query)]
-pub struct BundleQuery {
-    /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,precision=f32`.
-    #[param(value_type = Option<String>, example = "standard")]
-    profile: Option<ProfileText>,
-    /// In place of a profile: the cheapest whose error is at most this, Lab.
-    #[param(exclusive_minimum = 0.0)]
-    max_error: Option<f64>,
-    /// In place of a profile: the most accurate that is done in so many seconds here.
-    #[param(exclusive_minimum = 0.0)]
-    max_seconds: Option<f64>,
-}
 
 /// All paints of a blend in one archive.
 ///
@@ -35,37 +18,27 @@ pub struct BundleQuery {
 /// `realisation.zip`.
 #[utoipa::path(
     get, operation_id = "bundle_blend", path = "/v1/blends/{id}/bundle.zip", tag = "blends",
-    params(("id" = String, Path, description = "Blend"), BundleQuery),
+    params(("id" = String, Path, description = "Blend"), ProfileQuery),
     responses(
-        (status = 200, description = "The archive", content((Vec<u8> = "application/zip"))),
+        (status = 200, description = "The archive", headers(
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated")),
+            content((Vec<u8> = "application/zip"))),
+        (status = 400, description = "A profile or a target that is none", body = ProblemDocument, content_type = "application/problem+json"),
         BlendProblems,
     )
 )]
 pub async fn bundle(
     State(app): State<App>,
     Address(id): Address<String>,
-    Query(query): Query<BundleQuery>,
+    Query(query): Query<ProfileQuery>,
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
     let blend = app.blend(&id).await?;
-    let target = targets::of_query(query.max_error, query.max_seconds, query.profile.is_some())?;
-    let asked = query.profile.unwrap_or_default();
-    asked.fits(&blend)?;
-    let mut profile = asked.of_query()?;
-    let mut picked = None;
-    if target.is_some() {
-        let whole = ("bundle", &blend.id, blend.file, target);
-        let (works, blend) = (Arc::clone(&app.works), Arc::clone(&blend));
-        let found = app.pick(&whole, move || {
-            let asked = Asked::Bundle {
-                thing: &blend.thing,
-            };
-            works.pick(&asked, &target).map_err(Problem::of_query)
-        });
-        let found = found.await?;
-        profile = *found.profile();
-        picked = Some(found);
-    }
+    let whole = ("bundle", &blend.id, blend.file);
+    let found = query.profile_of(&app, &blend, &whole, |works, thing, target| {
+        works.pick(&Asked::Bundle { thing }, target)
+    });
+    let (profile, picked) = found.await?;
     let key = ids::result("blend_bundle", &(&blend.id, blend.file, profile.export));
     let name = format!("{}.zip", blend.id);
     // What a target picks may change with the machine's load.

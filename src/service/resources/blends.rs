@@ -54,9 +54,14 @@ pub struct BlendOrder {
         ("Idempotency-Key" = Option<String>, Header, description = "Refuses this key with another request")),
     request_body = BlendOrder,
     responses(
-        (status = 200, description = "The blend, made before", body = BlendDocument),
-        (status = 201, description = "The blend", body = BlendDocument, headers(("Location" = String, description = "Its address"))),
-        (status = 202, description = "The job that makes it", body = JobDocument, headers(("Location" = String, description = "The job's address"))),
+        (status = 200, description = "The blend, made before", body = BlendDocument,
+            headers(("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"))),
+        (status = 201, description = "The blend", body = BlendDocument, headers(
+            ("Location" = String, description = "Its address"),
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"))),
+        (status = 202, description = "The job that makes it", body = JobDocument, headers(
+            ("Location" = String, description = "The job's address"),
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"))),
         (status = 422, description = "Too few or too many paints, or unknown ones", body = ProblemDocument, content_type = "application/problem+json"),
         Problems,
     )

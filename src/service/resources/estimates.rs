@@ -33,7 +33,7 @@ pub struct EstimateDocument {
     /// Its knobs.
     #[schema(value_type = Object)]
     knobs: Profile,
-    /// Wall time on this machine as it is now, seconds.
+    /// Wall time on this machine, seconds, under its load of now.
     seconds: f64,
     /// The same by stage: `stage` and `seconds`.
     #[schema(value_type = Vec<Object>)]
@@ -67,8 +67,9 @@ struct Picture {
 
 /// Estimate a request.
 ///
-/// A small part of the work is done, here and now, and the rest is reckoned from it; nothing is kept. With `max_error`
-/// or `max_seconds` the answer says which profile would be picked.
+/// A small part of the work is done, here and now, and the rest is reckoned from it; writing, hashing and fits are reckoned
+/// by what this machine took when the service started, or in the study in its data folder. Nothing is kept. With
+/// `max_error` or `max_seconds` the answer says which profile would be picked.
 #[utoipa::path(
     post, operation_id = "create_estimate", path = "/v1/estimates", tag = "accuracy",
     request_body = EstimateOrder,

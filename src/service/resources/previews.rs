@@ -50,7 +50,8 @@ impl PreviewFormat {
     params(("id" = String, Path, description = "Blend"), ("format" = PreviewFormat, Path, description = "Picture, or its report"), WeightQuery, ViewQuery),
     responses(
         (status = 200, description = "The picture", headers(
-            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; bound on its FLIP; error of the flakes, Lab"),
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
+            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; FLIP between two drawings, usually above that of one; error of the flakes, Lab"),
             ("Link" = String, description = "The picture's report")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
         (status = 400, description = "Weights that do not fit the blend, or a view that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
         BlendProblems,
@@ -77,7 +78,8 @@ pub async fn of_blend(
     params(("id" = String, Path, description = "Paint"), ("format" = PreviewFormat, Path, description = "Picture, or its report"), ViewQuery),
     responses(
         (status = 200, description = "The picture", headers(
-            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; bound on its FLIP; error of the flakes, Lab"),
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
+            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; FLIP between two drawings, usually above that of one; error of the flakes, Lab"),
             ("Link" = String, description = "The picture's report")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
         PaintProblems,
     )
@@ -162,7 +164,8 @@ pub struct PreviewOrder {
     params(("Idempotency-Key" = Option<String>, Header, description = "Refuses this key with another request")),
     responses(
         (status = 200, description = "The picture", headers(
-            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; bound on its FLIP; error of the flakes, Lab")),
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
+            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; FLIP between two drawings, usually above that of one; error of the flakes, Lab")),
             content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
         (status = 422, description = "A paint that is not there, weights that do not fit, or a scene that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
         Problems,

@@ -4,8 +4,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use axum::extract::State;
-use serde::Deserialize;
-use utoipa::IntoParams;
 
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
@@ -13,24 +11,9 @@ use crate::service::http::{
     Address, Answer, BlendProblems, PaintProblems, Problem, ProblemDocument, Query, QueryOfTwo,
 };
 use crate::service::ids;
-use crate::service::parameters::{ProfileText, WeightQuery, targets};
+use crate::service::parameters::{ProfileQuery, WeightQuery};
 use crate::service::shelf::Shelved;
 use crate::service::work::{Asked, Format};
-
-/// How accurately a file is written.
-#[derive(Debug, Deserialize, IntoParams)]
-#[into_params(parameter_in = Query)]
-pub struct ProfileQuery {
-    /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,precision=f32,draw=alias`.
-    #[param(value_type = Option<String>, example = "standard")]
-    profile: Option<ProfileText>,
-    /// In place of a profile: the cheapest whose error is at most this, Lab.
-    #[param(exclusive_minimum = 0.0)]
-    pub max_error: Option<f64>,
-    /// In place of a profile: the most accurate that is done in so many seconds here.
-    #[param(exclusive_minimum = 0.0)]
-    pub max_seconds: Option<f64>,
-}
 
 /// A blend at some weights, as a file.
 ///
@@ -40,7 +23,8 @@ pub struct ProfileQuery {
     get, operation_id = "realise_blend", path = "/v1/blends/{id}/realisation.{format}", tag = "realisations",
     params(("id" = String, Path, description = "Blend"), ("format" = Format, Path, description = "File"), WeightQuery, ProfileQuery),
     responses(
-        (status = 200, description = "The file", content(
+        (status = 200, description = "The file", headers(
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated")), content(
             (Vec<u8> = "application/zip"), (Vec<u8> = "model/gltf-binary"), (serde_json::Value = "application/json"),
             (Vec<u8> = "application/vnd.carpaint.paint"))),
         (status = 400, description = "Weights that do not fit the blend", body = ProblemDocument, content_type = "application/problem+json"),
@@ -62,7 +46,8 @@ pub async fn of_blend(
     get, operation_id = "realise_paint", path = "/v1/paints/{id}/realisation.{format}", tag = "realisations",
     params(("id" = String, Path, description = "Paint"), ("format" = Format, Path, description = "File"), ProfileQuery),
     responses(
-        (status = 200, description = "The file", content(
+        (status = 200, description = "The file", headers(
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated")), content(
             (Vec<u8> = "application/zip"), (Vec<u8> = "model/gltf-binary"), (serde_json::Value = "application/json"),
             (Vec<u8> = "application/vnd.carpaint.paint"))),
         PaintProblems,
@@ -85,26 +70,17 @@ async fn realise(
     query: ProfileQuery,
 ) -> Result<Answer, Problem> {
     let begun = Instant::now();
-    let target = targets::of_query(query.max_error, query.max_seconds, query.profile.is_some())?;
-    let asked = query.profile.unwrap_or_default();
-    asked.fits(&thing)?;
-    let mut profile = asked.of_query()?;
-    let mut picked = None;
-    if target.is_some() {
-        let asked = (&thing.id, thing.file, &weights, format, target);
-        let (works, thing, weights) = (Arc::clone(&app.works), Arc::clone(&thing), weights.clone());
-        let found = app.pick(&asked, move || {
-            let asked = Asked::Realise {
-                thing: &thing.thing,
-                weights: weights.as_ref(),
-                format,
-            };
-            works.pick(&asked, &target).map_err(Problem::of_query)
-        });
-        let found = found.await?;
-        profile = *found.profile();
-        picked = Some(found);
-    }
+    let whole = (&thing.id, thing.file, &weights, format);
+    let of = weights.clone();
+    let found = query.profile_of(app, &thing, &whole, move |works, thing, target| {
+        let asked = Asked::Realise {
+            thing,
+            weights: of.as_ref(),
+            format,
+        };
+        works.pick(&asked, target)
+    });
+    let (profile, picked) = found.await?;
     let key = ids::result(
         "realisation",
         &(&thing.id, thing.file, &weights, format, profile.export),

@@ -113,9 +113,14 @@ impl IngestQuery {
         ("Idempotency-Key" = Option<String>, Header, description = "Refuses this key with another request")),
     request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "The measurement"),
     responses(
-        (status = 200, description = "The paint, made of the same upload before", body = PaintDocument),
-        (status = 201, description = "The paint", body = PaintDocument, headers(("Location" = String, description = "Its address"))),
-        (status = 202, description = "The job that makes it", body = JobDocument, headers(("Location" = String, description = "The job's address"))),
+        (status = 200, description = "The paint, made of the same upload before", body = PaintDocument,
+            headers(("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"))),
+        (status = 201, description = "The paint", body = PaintDocument, headers(
+            ("Location" = String, description = "Its address"),
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"))),
+        (status = 202, description = "The job that makes it", body = JobDocument, headers(
+            ("Location" = String, description = "The job's address"),
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"))),
         (status = 413, description = "The upload is too large", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 422, description = "The upload is no measurement, or a damaged one", body = ProblemDocument, content_type = "application/problem+json"),
         Problems,

@@ -77,7 +77,9 @@ pub async fn blend(app: &App, under_way: &Arc<UnderWay>) -> Result<Ended, Proble
         serde_json::to_string(&BlendOptions { profile, places }).map_err(Problem::internal)?;
     let keep = || app.keep_blend(id, &paints, &options, file.clone());
     let kept = under_way.insist(app, keep).await?;
-    under_way.ended("store");
+    if kept.is_ok() {
+        under_way.ended("store");
+    }
     Ok(kept)
 }
 

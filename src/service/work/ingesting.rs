@@ -57,11 +57,7 @@ pub async fn ingest(
         let ended = |stage: &'static str| on.ended(stage);
         let fitted = works.ingest(local.path(), &order, progress, &ended);
         let is_fit = is_paint_file(local.path()).is_ok_and(|as_it_is| !as_it_is);
-        // The caller knows the upload, not the file it was kept in.
-        let kept_in = local.path().display().to_string();
-        fitted
-            .map(|file| (file, is_fit))
-            .map_err(|error| error.without(&kept_in))
+        fitted.map(|file| (file, is_fit))
     });
     let Ok(fitted) = fitted.await? else {
         return Ok(Err(CalledOff));
@@ -78,7 +74,9 @@ pub async fn ingest(
     let kept = under_way
         .insist(app, || app.keep_paint(id, &written, Some(upload)))
         .await?;
-    under_way.ended("store");
+    if kept.is_ok() {
+        under_way.ended("store");
+    }
     Ok(kept)
 }
 

@@ -94,7 +94,7 @@ impl JobDocument {
         Self::of(&JobRecord {
             state: end.state,
             problem: end.problem.map(str::to_owned),
-            stages: end.stages.map(str::to_owned),
+            stages: Some(end.stages.to_owned()),
             ..job.clone()
         })
     }

@@ -261,7 +261,7 @@ async fn end(
     let ended = JobEnd {
         state,
         problem: problem.as_deref(),
-        stages: Some(&stages),
+        stages: &stages,
     };
     if !app.catalogue.end_job(&job.id, ended).await? {
         // It has an end already; that one counts.

@@ -156,7 +156,7 @@ impl Works for Workshop {
         for (name, path) in [
             ("sampling-mean-de2000", "/rendering/sampling/mean_delta_e"),
             ("sampling-p95-de2000", "/rendering/sampling/p95_delta_e"),
-            ("sampling-flip", "/rendering/sampling/flip_bound"),
+            ("sampling-flip", "/rendering/sampling/flip_between_drawings"),
             ("flakes-lab", "/error/lab"),
         ] {
             accuracy.extend(number(path).map(|value| format!("{name}={value:.4}")));

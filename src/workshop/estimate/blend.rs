@@ -2,7 +2,7 @@
 
 use super::ingest::{Sampled, of_paint, sample};
 use super::{
-    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, shortest, this_machine, timed,
+    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, shortest, timed, write_stage,
 };
 use crate::accuracy::{Profile, blend_error};
 use crate::blend::Blend;
@@ -105,9 +105,10 @@ fn of_samples(
     });
     if written {
         stages.push(Stage {
-            stage: "write",
-            seconds: at(encode_small, encode_large) + this_machine().write_seconds(bytes),
+            stage: "encode",
+            seconds: at(encode_small, encode_large),
         });
+        stages.extend(write_stage(bytes));
     }
     let error = EstimatedError::lab(blend_error(&large.1).lab);
     Ok(Estimate::new(profile, stages, bytes, error))

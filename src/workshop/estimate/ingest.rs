@@ -45,7 +45,7 @@ pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, 
     let [small, large] = &sampled.paints;
     let bytes = extrapolated(size(small)?, size(large)?, whole);
     let mut stages = sampled.stages;
-    stages.push(write_stage(bytes));
+    stages.extend(write_stage(bytes));
     let error = EstimatedError::lab(paint_error(large).lab);
     Ok(Estimate::new(&options.profile, stages, bytes, error))
 }

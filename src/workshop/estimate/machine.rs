@@ -3,6 +3,7 @@
 //! Calibrated quickly when first needed (a few hundredths of a second; the service does it when it starts), or thoroughly
 //! by a study, whose figures a service that has the study in its data folder takes instead.
 
+use std::path::Path;
 use std::sync::OnceLock;
 
 use super::{extrapolated, timed};
@@ -19,36 +20,47 @@ const THOROUGH: usize = 15;
 const SMALL: u16 = 1 << 12;
 const LARGE: u32 = 1 << 20;
 
-/// This machine: as a study found it, otherwise calibrated at the first call.
+/// This machine: as it was learned, otherwise calibrated at the first call, with the disk of temporary files.
 #[must_use]
 pub fn this_machine() -> &'static Machine {
-    HERE.get_or_init(|| calibrated(QUICK))
+    HERE.get_or_init(|| calibrated(QUICK, &std::env::temp_dir()))
 }
 
-/// Takes a study's figures for this machine's; `false` when it was calibrated already, or one of them is no time.
+/// Learns this machine: by a study's figures where they are times, otherwise by a quick calibration with the disk of this
+/// folder. `false` when it was known already, which it then stays.
+pub fn learn_machine(study: Option<Machine>, folder: &Path) -> bool {
+    let sound = study.filter(Machine::is_sound);
+    HERE.set(sound.unwrap_or_else(|| calibrated(QUICK, folder)))
+        .is_ok()
+}
+
+/// This machine, thoroughly, with the disk of this folder.
 #[must_use]
-pub fn known_machine(machine: Machine) -> bool {
-    machine.is_sound() && HERE.set(machine).is_ok()
+pub fn study_machine(folder: &Path) -> Machine {
+    calibrated(THOROUGH, folder)
 }
 
-/// This machine, thoroughly.
-#[must_use]
-pub fn study_machine() -> Machine {
-    calibrated(THOROUGH)
-}
-
-fn calibrated(goes: usize) -> Machine {
+fn calibrated(goes: usize, folder: &Path) -> Machine {
     let content = vec![0x5a_u8; LARGE as usize];
-    let small = usual(goes, || written(&content[..usize::from(SMALL)]));
-    let large = usual(goes, || written(&content));
-    let (small, large) = ((f64::from(SMALL), small), (f64::from(LARGE), large));
-    let write = extrapolated(small, large, 0.0);
     Machine {
-        write,
-        write_byte: (large.1 - write).max(0.0) / large.0,
-        hash_byte: hashed(goes, &content) / large.0,
+        write: writing(goes, folder, &content).ok(),
+        hash_byte: hashed(goes, folder, &content) / f64::from(LARGE),
         evaluation: evaluated(goes),
     }
+}
+
+/// Seconds of writing a small file, and of each byte beside.
+fn writing(goes: usize, folder: &Path, content: &[u8]) -> std::io::Result<[f64; 2]> {
+    let small = &content[..usize::from(SMALL)];
+    // Where it cannot be done it takes no time either.
+    written(folder, small)?;
+    let (small, large) = (
+        usual(goes, || written(folder, small)),
+        usual(goes, || written(folder, content)),
+    );
+    let ends = [(f64::from(SMALL), small), (f64::from(LARGE), large)];
+    let fixed = extrapolated(ends[0], ends[1], 0.0);
+    Ok([fixed, (large - fixed).max(0.0) / f64::from(LARGE)])
 }
 
 /// The middle of some goes: what work takes that waits for a disk.
@@ -59,9 +71,9 @@ fn usual<T>(goes: usize, mut work: impl FnMut() -> T) -> f64 {
 }
 
 /// Writes a file as results are written: beside its place, synced, renamed, and the folder synced.
-fn written(content: &[u8]) -> std::io::Result<()> {
+fn written(folder: &Path, content: &[u8]) -> std::io::Result<()> {
     use std::io::Write as _;
-    let folder = tempfile::tempdir()?;
+    let folder = tempfile::tempdir_in(folder)?;
     let mut file = tempfile::NamedTempFile::new_in(folder.path())?;
     file.write_all(content)?;
     file.as_file().sync_all()?;
@@ -70,17 +82,19 @@ fn written(content: &[u8]) -> std::io::Result<()> {
 }
 
 /// Seconds that reading and hashing a file of this content takes.
-fn hashed(goes: usize, content: &[u8]) -> f64 {
+fn hashed(goes: usize, folder: &Path, content: &[u8]) -> f64 {
     let read = || -> std::io::Result<f64> {
-        let file = tempfile::NamedTempFile::new()?;
+        let file = tempfile::NamedTempFile::new_in(folder)?;
         std::fs::write(file.path(), content)?;
-        Ok(usual(goes, || {
-            blake3::Hasher::new()
-                .update_reader(std::fs::File::open(file.path())?)
-                .map(|hasher| hasher.finalize())
-        }))
+        let hash = || -> std::io::Result<blake3::Hash> {
+            let mut hasher = blake3::Hasher::new();
+            hasher.update_reader(std::fs::File::open(file.path())?)?;
+            Ok(hasher.finalize())
+        };
+        hash()?;
+        Ok(usual(goes, hash))
     };
-    // Where there is no room for a file, memory stands in.
+    // Where no file can be written, memory stands in.
     read().unwrap_or_else(|_| usual(goes, || blake3::hash(content)))
 }
 
@@ -123,18 +137,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_calibrated_machine_takes_time_for_everything_and_longer_for_more() {
-        let machine = calibrated(3);
+    fn a_calibrated_machine_takes_time_for_everything() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let machine = calibrated(3, folder.path());
         assert!(machine.is_sound());
-        assert!(machine.write > 0.0 && machine.hash_byte > 0.0 && machine.evaluation > 0.0);
-        assert!(machine.write_seconds(1e9) >= machine.write_seconds(1.0));
+        // A megabyte of a disk takes more than a nanosecond, and so does an evaluation.
+        let written = machine.write_seconds(f64::from(LARGE)).expect("written");
+        assert!(written > 1e-9 && machine.evaluation > 1e-9 && machine.hash_byte > 0.0);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("there").count(), 0);
     }
 
     #[test]
-    fn figures_that_are_no_times_are_not_taken() {
-        let machine = calibrated(1);
-        for write in [-1.0, f64::NAN, f64::INFINITY] {
-            assert!(!known_machine(Machine { write, ..machine }));
-        }
+    fn where_nothing_can_be_written_the_rest_is_calibrated() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let machine = calibrated(1, &folder.path().join("not there"));
+        assert_eq!(machine.write, None);
+        assert!(machine.hash_byte > 0.0 && machine.is_sound());
     }
 }

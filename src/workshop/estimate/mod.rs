@@ -4,8 +4,8 @@
 //! pixels of the very picture. Time and bytes of two such samples, one larger than the other, give what is fixed and what
 //! grows with the work; the error is measured on the larger sample. A sample takes a few hundredths of the time of the
 //! whole, and as it runs under the same load, the estimate is of this machine as it is. What cannot be done in part is
-//! reckoned from what a [machine](this_machine) was calibrated to take: writing to the disk, hashing, and the fit of a bare reflectance table, which
-//! costs as much as a number of evaluations of a paint.
+//! reckoned from what a [machine](this_machine) was calibrated to take: writing to the disk, hashing, and the fit of a
+//! bare reflectance table, which costs as much as a number of evaluations of a paint.
 //!
 //! Results never depend on an estimate; what is picked for a time limit does.
 
@@ -22,7 +22,7 @@ use serde::Serialize;
 
 pub use blend::{estimate_blend, estimate_blend_of};
 pub use ingest::{estimate_ingest, sample_to_estimate};
-pub use machine::{known_machine, study_machine, this_machine};
+pub use machine::{learn_machine, study_machine, this_machine};
 pub use preview::{PictureWork, SmallPictures, estimate_preview};
 pub use realise::{estimate_bundle, estimate_realise};
 pub use work::Work;
@@ -120,12 +120,11 @@ fn left_at(angles: usize, step: usize) -> usize {
     (angles - 1).div_ceil(step) + 1
 }
 
-/// Writing a result of this size to disk.
-fn write_stage(bytes: f64) -> Stage {
-    Stage {
-        stage: "write",
-        seconds: this_machine().write_seconds(bytes),
-    }
+/// Writing a result of this size to disk; nothing, where this machine could not write.
+fn write_stage(bytes: f64) -> Option<Stage> {
+    let seconds = this_machine().write_seconds(bytes)?;
+    let stage = "write";
+    Some(Stage { stage, seconds })
 }
 
 /// Seconds that something takes, and what it gives.

@@ -82,7 +82,7 @@ impl SmallPictures {
             seconds,
         }];
         if work.written {
-            stages.push(write_stage(bytes));
+            stages.extend(write_stage(bytes));
         }
         let error = EstimatedError {
             value: error,

@@ -76,7 +76,7 @@ fn of_file(
         seconds: once + COLD * at(&|k| samples[k].1),
     }];
     if written {
-        stages.push(write_stage(bytes));
+        stages.extend(write_stage(bytes));
     }
     let report = &samples[1].2.report;
     let error = report.pointer("/accuracy/error/lab");

@@ -60,6 +60,27 @@ impl Material {
         })
     }
 
+    /// So many paints of a few slices of few texels.
+    #[cfg(test)]
+    pub(super) fn tiny(paints: u64) -> Self {
+        let base = crate::workshop::samples::by_name("polaris_silber").expect("a sample");
+        let recipe = |seed| crate::fit::FlakeRecipe {
+            angles: 4,
+            texels: 12,
+            seed,
+            ..crate::fit::FlakeRecipe::default()
+        };
+        let source = |seed| Pictures {
+            name: format!("tiny {seed}"),
+            base: base.base(),
+            flakes: Box::new(SimulatedPatch::new(&base.base(), &recipe(seed)).expect("in range")),
+        };
+        Self {
+            sources: (0..paints).map(source).collect(),
+            fits: Vec::new(),
+        }
+    }
+
     pub(super) fn names(&self) -> Vec<String> {
         let about = |p: &Pictures| {
             let [width, height] = p.flakes.size();

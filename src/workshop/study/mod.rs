@@ -37,8 +37,15 @@ pub fn study(
     options: &StudyOptions,
     tell: Tell<'_>,
 ) -> Result<Study, WorkshopError> {
+    of_material(Material::open(names)?, options, tell)
+}
+
+fn of_material(
+    mut material: Material,
+    options: &StudyOptions,
+    tell: Tell<'_>,
+) -> Result<Study, WorkshopError> {
     let begun = Instant::now();
-    let mut material = Material::open(names)?;
     let ingest = fronts::ingest(&mut material, options, tell)?;
     let blend = fronts::blend(&mut material, options, tell)?;
     let join = fronts::join(&mut material, options, tell)?;
@@ -54,7 +61,7 @@ pub fn study(
         paints: material.names(),
         quick: options.quick,
         seconds: begun.elapsed().as_secs_f64(),
-        machine: Some(study_machine()),
+        machine: Some(study_machine(&std::env::temp_dir())),
         fronts: [ingest, blend]
             .into_iter()
             .chain(join)
@@ -91,4 +98,39 @@ fn shortest<T>(
     }
     let made = made.ok_or_else(|| WorkshopError::internal("no go at all"))?;
     Ok((least, made))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_study_of_two_paints_has_four_fronts_and_of_three_a_fifth() {
+        for (paints, fronts) in [
+            (2, &["ingest", "blend", "realise", "preview"][..]),
+            (3, &["ingest", "blend", "join", "realise", "preview"]),
+        ] {
+            let material = Material::tiny(paints);
+            let quick = StudyOptions { quick: true };
+            let study = of_material(material, &quick, &|_, _| ()).expect("measured");
+            let works: Vec<&str> = study
+                .fronts
+                .iter()
+                .map(|front| front.work.as_str())
+                .collect();
+            assert_eq!(works, fronts);
+            for front in &study.fronts {
+                assert_eq!(front.presets().count(), 3, "{}", front.work);
+                assert!(front.points.iter().any(|point| point.on_front));
+                let told = |point: &crate::accuracy::study::Point| {
+                    point.seconds > 0.0 && point.error >= 0.0 && point.error.is_finite()
+                };
+                assert!(front.points.iter().all(told), "{}", front.work);
+            }
+            assert!(study.machine.is_some_and(|machine| machine.is_sound()));
+            let page = crate::accuracy::study::page(&study);
+            let joins = page.contains("in which order") || page.contains("cheapest order");
+            assert_eq!(joins, paints == 3);
+        }
+    }
 }

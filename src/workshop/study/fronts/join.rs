@@ -60,10 +60,11 @@ pub(in crate::workshop::study) fn join(
         let mut point = point(of, seconds, measured(&error)?);
         let transport = |term: &&Term| term.what == "transport";
         let detours = error.terms.iter().find(transport).and_then(|term| term.lab);
+        let unknown = || WorkshopError::internal("a blend of the study tells no transport");
         let pairs = made.blend.report().pairs.iter();
         let apart: f64 = pairs.map(|pair| pair.mean_cost).sum();
         point.more.extend([
-            ("of it transport".to_owned(), detours.unwrap_or(0.0)),
+            ("of it transport".to_owned(), detours.ok_or_else(unknown)?),
             ("way of all pairs".to_owned(), apart),
         ]);
         points.push(point);
