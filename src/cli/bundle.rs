@@ -40,6 +40,7 @@ impl Bundle {
         let mut stages = Stages::begin();
         let mut options = ReadingArgs::default().options(None, &self.target.profile)?;
         let blend = open(&self.input, &options, &|_| ())?;
+        stages.end("open");
         let picked = self.target.pick(&Work::Bundle {
             thing: &blend,
             written: true,
@@ -47,13 +48,15 @@ impl Bundle {
         if let Some(picked) = &picked {
             options.profile = *picked.profile();
         }
-        stages.end("open");
+        if picked.is_some() {
+            stages.end("search");
+        }
         let made = bundle_blend(&blend, &options.profile)?;
         stages.end("bundle");
         output::replace(&self.out, &made.bytes)?;
         stages.end("write");
         stages.write(self.timings.as_deref())?;
-        let size = format!("{} bytes", made.bytes.len());
+        let size = made::size_and_error(&made);
         made::tell(json, &self.out, &made, picked.as_ref(), &size)
     }
 }

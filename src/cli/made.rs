@@ -47,6 +47,14 @@ impl Stages {
     }
 }
 
+/// How large a file is, and how far off where that is known.
+pub fn size_and_error(made: &Made) -> String {
+    let lab = made.report.pointer("/accuracy/error/lab");
+    let lab = lab.and_then(serde_json::Value::as_f64);
+    let error = lab.map_or(String::new(), |lab| format!(", error {lab:.3} Lab"));
+    format!("{} bytes{error}", made.bytes.len())
+}
+
 /// Tells what was made: one JSON object, or notes and a last line for people.
 pub fn tell(
     json: bool,

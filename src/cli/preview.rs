@@ -196,6 +196,7 @@ impl Preview {
             environment,
             lights: None,
         };
+        stages.end("open");
         let progress = Progress::new("looking for samples");
         let picked = self.target.pick(&Work::Preview(PictureWork {
             thing: &thing,
@@ -211,7 +212,9 @@ impl Preview {
             eprintln!("target {}", picked.line());
             wanted.samples_per_pixel = picked.profile().samples_per_pixel;
         }
-        stages.end("open");
+        if picked.is_some() {
+            stages.end("search");
+        }
         let progress = Progress::new("drawing");
         let made = preview(
             &thing,

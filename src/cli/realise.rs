@@ -41,6 +41,7 @@ impl Realise {
         let thing = open(&self.input, &options, &|share| progress.at(share))?;
         drop(progress);
         let weights = self.weights.for_thing(&thing)?;
+        stages.end("open");
         let picked = self.target.pick(&Work::Realise {
             thing: &thing,
             weights: weights.as_ref(),
@@ -50,13 +51,15 @@ impl Realise {
         if let Some(picked) = &picked {
             options.profile = *picked.profile();
         }
-        stages.end("open");
+        if picked.is_some() {
+            stages.end("search");
+        }
         let made = realise(&thing, weights.as_ref(), format, &options.profile)?;
         stages.end("realise");
         output::replace(&self.out, &made.bytes)?;
         stages.end("write");
         stages.write(self.timings.as_deref())?;
-        let size = format!("{} bytes", made.bytes.len());
+        let size = made::size_and_error(&made);
         made::tell(json, &self.out, &made, picked.as_ref(), &size)
     }
 }

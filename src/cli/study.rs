@@ -54,7 +54,9 @@ impl Study {
             eprintln!("{}: the knee is {}", front.work, front.knee);
         }
         for growth in &measured.growth {
-            eprintln!("time grows as {}^{:.2}", growth.with, growth.exponent);
+            if let Some(exponent) = growth.exponent {
+                eprintln!("time grows as {}^{exponent:.2}", growth.with);
+            }
         }
         eprintln!("{}: README.md, study.json and plots", self.out.display());
         Ok(())

@@ -26,7 +26,9 @@ pub fn blend_paints(
     profile: &Profile,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Blended, WorkshopError> {
-    let mut notes = Vec::new();
+    let mut notes: Vec<String> = (paints.iter())
+        .filter_map(|file| clustered_otherwise(file, &profile.flakes))
+        .collect();
     let reduced: Vec<Option<CarPaint>> = paints
         .iter()
         .map(|file| reduced(file, &profile.flakes, &mut notes))
@@ -59,10 +61,12 @@ pub fn blend_paints(
         energy: Some(file.energy.clone()),
         clamps: clamps_of(file).to_vec(),
         warnings: file.warnings.clone(),
-        reduced: reduced.as_ref().map(|fewer| Reduction {
-            from: widest(&file.paint),
-            to: widest(fewer),
-        }),
+        reduced: (reduced.as_ref())
+            .map(|fewer| Reduction {
+                from: widest(&file.paint),
+                to: widest(fewer),
+            })
+            .filter(|by| by.to < by.from),
     });
     let deviation =
         blend_deviation(&ingredients, &profile.blend).map_err(WorkshopError::internal)?;
@@ -124,6 +128,20 @@ fn clustering_of(file: &PaintFile, wanted: &ClusterSettings) -> Option<Clusterin
             .or(clustering.left_out_w1),
         realised_lab,
         ..clustering
+    })
+}
+
+/// Says so of a paint that was clustered otherwise than the profile would: clusters are made when it is ingested.
+fn clustered_otherwise(file: &PaintFile, wanted: &ClusterSettings) -> Option<String> {
+    let had = file.clustering.as_ref()?;
+    let rule = wanted.box_rule.name();
+    let other = had.clusters != wanted.clusters || had.box_rule != rule;
+    (other && !file.provenance.is_blend()).then(|| {
+        format!(
+            "{}: is clustered as it was ingested, with {} clusters a slice and {} boxes; the profile's {} and {rule} are for \
+             measurements",
+            file.name, had.clusters, had.box_rule, wanted.clusters
+        )
     })
 }
 

@@ -1,7 +1,7 @@
 //! A target in place of knobs: the cheapest profile that is accurate enough, or the most accurate that is fast enough.
 //!
-//! The profiles of a short ladder are estimated on the work itself: for an error from cheap to dear until one will do, for
-//! a time from the usual one on. Where an estimate's error is of a sample of the slices, the error is measured in full
+//! The profiles of a short ladder are estimated on the work itself, from cheap to dear: for an error until one will do, for
+//! a time as long as looking further takes little of it. Where an estimate's error is of a sample of the slices, the error is measured in full
 //! before a profile is picked for it. What is picked for a time limit depends on the machine; the result depends on the profile picked and on nothing else.
 
 mod ladder;
@@ -45,7 +45,7 @@ pub struct Picked {
 }
 
 /// Part of a time limit after which no more accurate profile is looked for.
-const SEARCH_SHARE: f64 = 0.25;
+const SEARCH_SHARE: f64 = 0.4;
 
 /// A search for a profile, and when it began.
 struct Search(Instant);
@@ -180,33 +180,34 @@ impl Target {
         Ok(estimates)
     }
 
-    /// Estimates of the usual profile and of those around it, from cheap to dear: upwards while they are fast enough and
-    /// the search has taken little of the time, downwards until one is.
+    /// Estimates from the cheapest on, as long as looking at the next leaves most of the time to the work: it is taken to
+    /// take as many times as long as the last as that took of the one before, at least twice.
     fn fast_enough(
         &self,
         work: &Work<'_>,
         search: &Search,
     ) -> Result<Vec<Estimate>, WorkshopError> {
         let most = self.max_seconds.unwrap_or(f64::INFINITY);
-        let ladder = ladder(work);
-        let usual = ladder.iter().position(|own| *own == Profile::standard());
-        let (cheaper, others) = ladder.split_at(usual.unwrap_or(0));
         let mut estimates = Vec::new();
-        for profile in others {
-            let estimate = work.estimate(profile)?;
-            let too_slow = !self.is_in_time(&estimate, search.seconds());
-            estimates.push(estimate);
-            if too_slow || search.seconds() > SEARCH_SHARE * most {
+        let (mut last, mut growth) = (0.0_f64, 2.0_f64);
+        for profile in ladder(work) {
+            let begun = search.seconds();
+            if begun + growth * last > SEARCH_SHARE * most && !estimates.is_empty() {
                 break;
             }
-        }
-        let is_in_time = |estimate: &Estimate| self.is_in_time(estimate, search.seconds());
-        if !estimates.first().is_some_and(is_in_time) {
-            for profile in cheaper.iter().rev() {
-                estimates.insert(0, work.estimate(profile)?);
-                if is_in_time(&estimates[0]) {
-                    break;
-                }
+            let estimate = work.estimate(&profile)?;
+            let took = search.seconds() - begun;
+            growth = if last > 0.0 {
+                (took / last).max(2.0)
+            } else {
+                2.0
+            };
+            last = took;
+            let too_slow = !self.is_in_time(&estimate, search.seconds());
+            estimates.push(estimate);
+            // Of files the finest is the fastest, of all else the cheapest.
+            if too_slow && !matches!(work, Work::Realise { .. } | Work::Bundle { .. }) {
+                break;
             }
         }
         Ok(estimates)
@@ -223,7 +224,7 @@ impl Target {
     }
 
     /// Of estimates from cheap to dear: with a largest error the cheapest that meets all, with a longest time alone the
-    /// most accurate; where none does, the most accurate in time, and where none is in time, the cheapest.
+    /// most accurate; where none does, the most accurate in time, and where none is in time, the fastest.
     fn best(&self, estimates: Vec<Estimate>, searched: f64) -> Option<Estimate> {
         let error_of = |e: &Estimate| e.error.value.unwrap_or(f64::INFINITY);
         // Of equals the first, which is the cheapest whatever the clock says.
@@ -233,7 +234,8 @@ impl Target {
             .cloned()
             .collect();
         if in_time.is_empty() {
-            return estimates.into_iter().next();
+            let faster = |x: &Estimate, y: &Estimate| x.seconds.total_cmp(&y.seconds);
+            return estimates.into_iter().min_by(faster);
         }
         let cheapest = in_time.iter().find(|e| self.is_met(e, searched)).cloned();
         match (cheapest, self.max_error) {

@@ -23,6 +23,12 @@ fn a_blend_is_bundled_the_same_on_any_number_of_threads() {
 #[test]
 fn a_bundle_meets_a_target_and_tells_its_seconds_and_its_error() {
     let desk = Desk::with_blend();
+    let told = desk.ok(&["bundle", "b.blend", "--out", "b.zip"]).stderr;
+    let told = String::from_utf8(told).expect("text");
+    assert!(
+        told.contains(" bytes, error ") && told.contains(" Lab"),
+        "{told}"
+    );
     let words = "bundle b.blend --max-error 1000 --timings t.json --json --out b.zip";
     let said = json(&desk.ok(&words.split(' ').collect::<Vec<_>>()).stdout);
     assert_eq!(said["picked"]["met"], true, "{said}");
@@ -73,7 +79,7 @@ fn a_bundle_meets_a_target_and_tells_its_seconds_and_its_error() {
     let rounding = rounding.and_then(|term| term["lab"].as_f64());
     assert!(rounding.is_some_and(|lab| lab > 0.01), "{error}");
     let seconds = json(&desk.read("t.json"));
-    for stage in ["open", "bundle", "write", "total"] {
+    for stage in ["open", "search", "bundle", "write", "total"] {
         assert!(
             seconds[stage].as_f64().is_some_and(|s| s > 0.0),
             "{seconds}"

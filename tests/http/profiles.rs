@@ -114,15 +114,17 @@ async fn profiles_are_names_or_knobs_and_targets_are_answered_with_what_was_pick
 
     let shipped = house.get("/v1/accuracy").await;
     assert_eq!(shipped.json()["format"], "carpaint study");
-    std::fs::write(
-        data.path().join("study.json"),
-        br#"{"format": "of this house"}"#,
-    )
-    .expect("written");
-    assert_eq!(
-        house.get("/v1/accuracy").await.json()["format"],
-        "of this house"
-    );
+    let mut own = shipped.json();
+    own["program"] = json!("of this house");
+    let write = |text: &str| std::fs::write(data.path().join("study.json"), text).expect("written");
+    write(&own.to_string());
+    let served = house.get("/v1/accuracy").await.json();
+    assert_eq!(served["program"], "of this house");
+    for none in ["{}", "[1, 2", r#"{"format": "of this house"}"#] {
+        write(none);
+        let served = house.get("/v1/accuracy").await;
+        assert_eq!(served.json(), shipped.json(), "{none} is no study");
+    }
     house.close().await;
 }
 

@@ -11,8 +11,8 @@ pub struct Growth {
     pub about: String,
     /// Sizes and seconds.
     pub points: Vec<[f64; 2]>,
-    /// Exponent p of the fitted `seconds = c size^p`.
-    pub exponent: f64,
+    /// Exponent p of the fitted `seconds = c size^p`; `None` where there are too few sizes to tell.
+    pub exponent: Option<f64>,
     /// What it should be at most.
     pub limit: f64,
 }
@@ -43,22 +43,17 @@ impl Growth {
         Self {
             with: with.to_owned(),
             about: about.to_owned(),
+            exponent: (points.len() >= LEAST_SIZES && xx > 0.0).then(|| xy / xx),
             points,
-            exponent: if xx > 0.0 { xy / xx } else { 0.0 },
             limit,
         }
     }
 
-    /// Whether there are enough sizes to tell an exponent.
-    #[must_use]
-    pub fn is_measured(&self) -> bool {
-        self.points.len() >= LEAST_SIZES
-    }
-
-    /// Whether the exponent keeps to its limit, within what such a fit scatters.
+    /// Whether the exponent, as far as it can be told, keeps to its limit, within what such a fit scatters.
     #[must_use]
     pub fn is_within(&self) -> bool {
-        self.exponent <= self.limit + NOISE
+        self.exponent
+            .is_none_or(|exponent| exponent <= self.limit + NOISE)
     }
 }
 
@@ -72,9 +67,9 @@ mod tests {
             .map(|n: f64| [n, 0.3 * n.powf(1.4)])
             .to_vec();
         let growth = Growth::new("clusters", "", 1.6, points);
-        assert!((growth.exponent - 1.4).abs() < 1e-12);
-        assert!(growth.is_within() && growth.is_measured());
-        let one = Growth::new("paints", "", 1.0, vec![[2.0, 0.1]]);
-        assert!(!one.is_measured());
+        assert!((growth.exponent.expect("told") - 1.4).abs() < 1e-12);
+        assert!(growth.is_within());
+        let two = Growth::new("paints", "", 1.0, vec![[2.0, 0.1], [3.0, 0.9]]);
+        assert_eq!(two.exponent, None);
     }
 }

@@ -15,13 +15,18 @@ pub fn page(study: &Study) -> String {
     );
     let _ = write!(
         page,
-        "Measured with carpaint {} on {} threads, with {}. Times are {}, the shortest of several goes. The same for your machine and your paints: \
+        "Measured with carpaint {} on {} threads, with {}. Times are {}, {}. The same for your machine and your paints: \
          `carpaint study --out DIR PAINT...`. Put its `study.json` into the service's data folder, and `GET /v1/accuracy` \
          serves it.\n\n",
         study.program,
         study.threads,
         list(&study.paints),
-        study.clock
+        study.clock,
+        if study.quick {
+            "of one go or two: this is a quick study, of fewer settings and smaller pictures"
+        } else {
+            "the shortest of several goes"
+        }
     );
     at_a_glance(&mut page, study);
     for front in &study.fronts {
@@ -105,7 +110,8 @@ fn choice(study: &Study) -> String {
     format!(
         "The presets were chosen from such fronts. `standard` is for every day: its errors, {} at most here, {} the \
          {VISIBLE} that a trained eye tells apart side by side; something measured beats it in {} of {all} kinds of work. \
-         The knees, from which on time grows faster than the error falls, are here: {}. `draft` is for trying out: {} \
+         The knees, from which on time grows faster than the error falls, are here: {}; they differ from paint to paint \
+         and from one kind of work to another, and `standard`, one profile for all of them, lies between them. `draft` is for trying out: {} \
          the time of `standard`, errors up to {}. `reference` is what the others are compared with: {} the time of \
          `standard`, {} its error.\n\n",
         error(most_of_standard),
@@ -243,12 +249,11 @@ fn growth(page: &mut String, study: &Study) {
                 format!("{size:.0}: {}", time(*seconds))
             })
         };
-        let grows = if growth.is_measured() {
-            format!("size^{:.2}", growth.exponent)
-        } else {
-            "not told by so few sizes".to_owned()
-        };
-        let missed = growth.is_measured() && !growth.is_within();
+        let grows = growth.exponent.map_or_else(
+            || "not told by so few sizes".to_owned(),
+            |exponent| format!("size^{exponent:.2}"),
+        );
+        let missed = !growth.is_within();
         let _ = writeln!(
             page,
             "| {} | {} | {} | {} | {grows} | size^{:.1}{} |",

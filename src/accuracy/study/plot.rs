@@ -302,12 +302,13 @@ fn of_growth(growth: &[Growth]) -> String {
         let _ = writeln!(
             svg,
             "<path d=\"{line}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"2\"/>\
-             <circle cx=\"{}\" cy=\"{:.1}\" r=\"5\" fill=\"{color}\"/><text x=\"{}\" y=\"{at:.1}\">{}: size^{:.2}</text>",
+             <circle cx=\"{}\" cy=\"{:.1}\" r=\"5\" fill=\"{color}\"/><text x=\"{}\" y=\"{at:.1}\">{}{}</text>",
             right + 22.0,
             at - 4.5,
             right + 34.0,
             escaped(&g.with),
             g.exponent
+                .map_or(String::new(), |exponent| format!(": size^{exponent:.2}"))
         );
         at += 24.0;
     }

@@ -2,6 +2,7 @@
 
 use axum::extract::State;
 
+use crate::accuracy::study::Study;
 use crate::service::app::App;
 use crate::service::calibration::STUDY;
 use crate::service::http::{Answer, Keep, NoQuery, Problem, Problems};
@@ -22,9 +23,9 @@ const SHIPPED: &str = include_str!("../../../docs/study/study.json");
 pub async fn show(State(app): State<App>, _: NoQuery) -> Result<Answer, Problem> {
     let own = app.config.data.join(STUDY);
     let study = match tokio::fs::read(&own).await {
-        Ok(bytes) if serde_json::from_slice::<serde_json::Value>(&bytes).is_ok() => bytes,
+        Ok(bytes) if serde_json::from_slice::<Study>(&bytes).is_ok() => bytes,
         Ok(_) => {
-            tracing::warn!(file = %own.display(), "this study is not JSON; the shipped one is served");
+            tracing::warn!(file = %own.display(), "this is no study of this version; the shipped one is served");
             SHIPPED.as_bytes().to_vec()
         }
         Err(_) => SHIPPED.as_bytes().to_vec(),

@@ -39,6 +39,8 @@ pub async fn bundle(
         works.pick(&Asked::Bundle { thing }, target)
     });
     let (profile, picked) = found.await?;
+    let searched = begun.elapsed();
+    let begun = Instant::now();
     let key = ids::result("blend_bundle", &(&blend.id, blend.file, profile.export));
     let name = format!("{}.zip", blend.id);
     // What a target picks may change with the machine's load.
@@ -64,5 +66,6 @@ pub async fn bundle(
     let answer = Answer::result("application/zip", result, keep).saved_as(&name);
     Ok(answer
         .picked(picked.as_ref())
+        .stage("profile", searched)
         .stage("bundle", begun.elapsed()))
 }

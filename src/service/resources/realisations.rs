@@ -81,6 +81,8 @@ async fn realise(
         works.pick(&asked, target)
     });
     let (profile, picked) = found.await?;
+    let searched = begun.elapsed();
+    let begun = Instant::now();
     let key = ids::result(
         "realisation",
         &(&thing.id, thing.file, &weights, format, profile.export),
@@ -111,5 +113,6 @@ async fn realise(
     let answer = Answer::result(format.media_type(), result, keep).saved_as(&name);
     Ok(answer
         .picked(picked.as_ref())
+        .stage("profile", searched)
         .stage("realisation", begun.elapsed()))
 }

@@ -10,8 +10,8 @@ use crate::workshop::{MOST_SAMPLES, WorkshopError};
 
 /// Samples per pixel that the error is measured with first.
 const FIRST: u32 = 8;
-/// How often a number is reckoned and measured.
-const GOES: usize = 4;
+/// How often a number is reckoned and measured: doublings from the first to the most, and a few between.
+const GOES: usize = 14;
 /// Share of the error allowed that is aimed at, and that is near enough.
 const AIM: f64 = 0.95;
 const NEAR: f64 = 0.8;
@@ -66,9 +66,11 @@ pub(super) fn pick_samples(
         }
         fit
     };
-    // What a picture's samples leave to chance is measured for a target that asks; otherwise the time is the picture's.
     let (samples, error) = match target.max_error {
-        None => (in_time(0.0).max(1), None),
+        None => {
+            let samples = in_time(0.0).max(1);
+            (samples, Some(picture.error_of(samples)?))
+        }
         Some(allowed) => {
             let begun = search.seconds();
             let first = measure(few)?;
@@ -104,38 +106,50 @@ fn scaled(of: Measured, samples: u32) -> Measured {
 
 /// About the least number of samples that leaves no more than this to chance; `most` where none does. A number that
 /// `measure` does not measure is taken for what it should leave.
+///
+/// Beside flakes the error can stay where it is over several doublings: what is reckoned from it is at least the double of
+/// a number that is too small, and lies between those that are and those that are not.
 fn samples_for(
     allowed: f64,
     first: Measured,
     most: u32,
     measure: &mut impl FnMut(u32) -> Result<Option<Measured>, WorkshopError>,
 ) -> Result<Measured, WorkshopError> {
+    let (mut short, mut enough): (Option<Measured>, Option<Measured>) = (None, None);
     let mut at = first;
-    let mut enough: Option<Measured> = None;
     for _ in 0..GOES {
-        if at.error <= allowed && enough.is_none_or(|least| at.samples < least.samples) {
+        let is_enough = at.error <= allowed;
+        if is_enough && enough.is_none_or(|least| at.samples < least.samples) {
             enough = Some(at);
         }
-        let near = (NEAR * allowed..=allowed).contains(&at.error);
-        let reckoned = f64::from(at.samples) * (at.error / (AIM * allowed)).powi(2);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped
-        let next = reckoned.ceil().clamp(1.0, f64::from(most)) as u32;
-        let worse = enough.is_some_and(|least| next >= least.samples);
-        if near || next == at.samples || worse {
+        if !is_enough && short.is_none_or(|most| at.samples > most.samples) {
+            short = Some(at);
+        }
+        let near = is_enough && at.error >= NEAR * allowed;
+        let above = short.map_or(0, |short| short.samples);
+        let below = enough.map_or(most.saturating_add(1), |enough| enough.samples);
+        if near || below <= above + above / 4 + 1 {
             break;
         }
+        let reckoned = f64::from(at.samples) * (at.error / (AIM * allowed)).powi(2);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped
+        let reckoned = reckoned.ceil().clamp(1.0, f64::from(most)) as u32;
+        let least = if is_enough { 1 } else { 2 * at.samples };
+        // Between two that are known, the middle of their ratio where the reckoning leads out.
+        let middle = (f64::from(above.max(1)) * f64::from(below)).sqrt() as u32;
+        let next = match reckoned.max(least) {
+            next if next < below && next > above => next,
+            _ => middle.clamp(above + 1, below - 1),
+        };
         let Some(measured) = measure(next)? else {
             return Ok(enough.unwrap_or_else(|| scaled(at, next)));
         };
         at = measured;
     }
-    if at.error <= allowed && enough.is_none_or(|least| at.samples < least.samples) {
-        enough = Some(at);
-    }
-    match enough {
-        Some(enough) => Ok(enough),
-        None if at.samples == most => Ok(at),
-        None => Ok(measure(most)?.unwrap_or_else(|| scaled(at, most))),
+    match (enough, short) {
+        (Some(enough), _) => Ok(enough),
+        (None, Some(short)) if short.samples == most => Ok(short),
+        (None, _) => Ok(measure(most)?.unwrap_or_else(|| scaled(at, most))),
     }
 }
 
@@ -169,6 +183,29 @@ mod tests {
                 "{allowed} {found:?} {needed}"
             );
             assert!(asked <= GOES + 2);
+        }
+    }
+
+    /// As beside flakes: nothing is gained from 16 samples to 128, then the root of their number.
+    #[test]
+    fn a_plateau_does_not_lead_to_the_most() {
+        let curve = |samples: u32| match samples {
+            ..16 => 1.2 * (16.0 / f64::from(samples)).sqrt(),
+            16..=128 => 1.2,
+            _ => 1.2 * (128.0 / f64::from(samples)).sqrt(),
+        };
+        for (allowed, needed) in [(1.5, 11), (1.25, 15), (1.19, 131), (1.0, 185), (0.5, 738)] {
+            let mut asked = 0;
+            let mut measure = |samples| {
+                asked += samples;
+                let error = curve(samples);
+                Ok(Some(Measured { samples, error }))
+            };
+            let first = measure(8).expect("measured").expect("measured");
+            let found = samples_for(allowed, first, 4096, &mut measure).expect("found");
+            assert!(found.error <= allowed, "{allowed} {found:?}");
+            assert!(found.samples <= needed * 8 / 5, "{allowed} {found:?}");
+            assert!(asked < 8 * needed + 64, "{allowed} {asked}");
         }
     }
 
