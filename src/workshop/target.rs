@@ -180,17 +180,22 @@ impl Target {
         Ok(estimates)
     }
 
-    /// Estimates from the cheapest on, as long as looking at the next leaves most of the time to the work: it is taken to
-    /// take as many times as long as the last as that took of the one before, at least twice.
+    /// Estimates from the fastest on, as long as looking at the next leaves most of the time to the work: it is taken to
+    /// take as many times as long as the last as that took of the one before, at least twice. Of files the finest is the
+    /// fastest, so that it is the one to look at.
     fn fast_enough(
         &self,
         work: &Work<'_>,
         search: &Search,
     ) -> Result<Vec<Estimate>, WorkshopError> {
         let most = self.max_seconds.unwrap_or(f64::INFINITY);
+        let mut ladder = ladder(work);
+        if matches!(work, Work::Realise { .. } | Work::Bundle { .. }) {
+            ladder.drain(..ladder.len() - 1);
+        }
         let mut estimates = Vec::new();
         let (mut last, mut growth) = (0.0_f64, 2.0_f64);
-        for profile in ladder(work) {
+        for profile in ladder {
             let begun = search.seconds();
             if begun + growth * last > SEARCH_SHARE * most && !estimates.is_empty() {
                 break;
@@ -205,8 +210,7 @@ impl Target {
             last = took;
             let too_slow = !self.is_in_time(&estimate, search.seconds());
             estimates.push(estimate);
-            // Of files the finest is the fastest, of all else the cheapest.
-            if too_slow && !matches!(work, Work::Realise { .. } | Work::Bundle { .. }) {
+            if too_slow {
                 break;
             }
         }

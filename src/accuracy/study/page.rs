@@ -111,7 +111,7 @@ fn choice(study: &Study) -> String {
         "The presets were chosen from such fronts. `standard` is for every day: its errors, {} at most here, {} the \
          {VISIBLE} that a trained eye tells apart side by side; something measured beats it in {} of {all} kinds of work. \
          The knees, from which on time grows faster than the error falls, are here: {}; they differ from paint to paint \
-         and from one kind of work to another, and `standard`, one profile for all of them, lies between them. `draft` is for trying out: {} \
+         and from one kind of work to another, and `standard` is one profile for all of them. `draft` is for trying out: {} \
          the time of `standard`, errors up to {}. `reference` is what the others are compared with: {} the time of \
          `standard`, {} its error.\n\n",
         error(most_of_standard),

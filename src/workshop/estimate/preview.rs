@@ -67,6 +67,12 @@ impl SmallPictures {
         self.tell(work.options.size, samples_per_pixel).0
     }
 
+    /// Seconds that the smallest of them took, most of which is getting ready.
+    #[must_use]
+    pub fn least_seconds(&self) -> f64 {
+        self.drawn.first().map_or(0.0, |first| first.seconds)
+    }
+
     /// What the picture takes, with its error where that is known.
     #[must_use]
     pub fn estimate(

@@ -16,6 +16,9 @@ const GOES: usize = 14;
 const AIM: f64 = 0.95;
 const NEAR: f64 = 0.8;
 
+/// Pixels that are drawn to tell an error, at most.
+const TOLD_PIXELS: f64 = 2.0 * 1024.0;
+
 /// By how much a picture may take longer than estimated.
 const MARGIN: f64 = 1.15;
 
@@ -68,7 +71,10 @@ pub(super) fn pick_samples(
     };
     let (samples, error) = match target.max_error {
         None => {
-            let samples = in_time(0.0).max(1);
+            // Telling the error takes its time too: about as long as a small picture, and its share of the pixels.
+            let told = TOLD_PIXELS / (width * height).max(1) as f64;
+            let telling = small.seconds(picture, in_time(0.0).max(1)) * told.min(1.0);
+            let samples = in_time(small.least_seconds() + telling).max(1);
             (samples, Some(picture.error_of(samples)?))
         }
         Some(allowed) => {
