@@ -2,7 +2,8 @@
 
 use super::ingest::{Sampled, of_paint, sample};
 use super::{
-    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, shortest, timed, write_stage,
+    COLD, Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, shortest, timed,
+    write_stage,
 };
 use crate::accuracy::{Profile, blend_error};
 use crate::blend::Blend;
@@ -57,9 +58,6 @@ fn sizes(paints: usize, profile: &Profile) -> Sizes {
 
 /// Angles of samples of more slices than are compared.
 const MANY_ANGLES: Sizes = [9, 14];
-
-/// What the first go takes longer than the shortest of three.
-const COLD: f64 = 1.2;
 
 fn of_samples(
     sampled: &[Sampled],

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::machine::stand_in;
 use super::{
-    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, left_at, step_for,
-    this_machine, timed, write_stage,
+    COLD, Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, left_at, steady,
+    step_for, this_machine, timed, write_stage,
 };
 use crate::accuracy::{
     Profile, clustering_error, left_out_w1, paint_error, predicted_clustering_error,
@@ -244,17 +244,15 @@ fn fitted(
     let go = |wanted: usize| -> Result<(f64, FittedFlakes), WorkshopError> {
         let steps = angles.map(|n| every * step_for(n, wanted));
         let thinned = Thinned::by_steps(pictures, steps);
-        let (seconds, fitted) = timed(|| fit_flakes(&thinned, &settings, &|_, _| ()));
+        let (seconds, fitted) = steady(|| fit_flakes(&thinned, &settings, &|_, _| ()));
         Ok((seconds, fitted.map_err(|e| WorkshopError::input(name, e))?))
     };
-    // The first go warms up.
-    go(sizes[0])?;
     let (small, large) = (go(sizes[0])?, go(sizes[1])?);
     let size = |fitted: &FittedFlakes| fitted.flakes.slices() as f64;
     let whole = (angles[0] * angles[1]) as f64;
     stages.push(Stage {
         stage: "flakes",
-        seconds: extrapolated((size(&small.1), small.0), (size(&large.1), large.0), whole),
+        seconds: COLD * extrapolated((size(&small.1), small.0), (size(&large.1), large.0), whole),
     });
     let mut paints = [small.1, large.1].map(|fitted| {
         let paint = CarPaint {
