@@ -4,6 +4,8 @@
 //! machine, so it stands in a header and never in the bytes of a result. Who posts is told the same as `target` in the
 //! JSON of the answer, which is no result.
 
+use std::time::Duration;
+
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::Response;
 use serde_json::{Map, Value};
@@ -106,6 +108,15 @@ impl Answer {
     pub fn picked(self, picked: Option<&Picked>) -> Self {
         match picked {
             Some(picked) => self.header(TARGET, &picked.line()),
+            None => self,
+        }
+    }
+
+    /// The same, and what looking for it took.
+    #[must_use]
+    pub fn picked_in(self, picked: Option<&Picked>, time: Duration) -> Self {
+        match picked {
+            Some(_) => self.picked(picked).stage("profile", time),
             None => self,
         }
     }

@@ -65,7 +65,6 @@ pub async fn bundle(
     let result = app.results.get_or_compute(key, compute).await?;
     let answer = Answer::result("application/zip", result, keep).saved_as(&name);
     Ok(answer
-        .picked(picked.as_ref())
-        .stage("profile", searched)
+        .picked_in(picked.as_ref(), searched)
         .stage("bundle", begun.elapsed()))
 }

@@ -112,7 +112,6 @@ async fn realise(
     };
     let answer = Answer::result(format.media_type(), result, keep).saved_as(&name);
     Ok(answer
-        .picked(picked.as_ref())
-        .stage("profile", searched)
+        .picked_in(picked.as_ref(), searched)
         .stage("realisation", begun.elapsed()))
 }

@@ -1,4 +1,4 @@
-//! The profiles that a target is looked for among, from cheap to dear.
+//! The profiles that a target is looked for among, from cheap to dear; of files from the smallest to the largest.
 
 use crate::accuracy::Profile;
 use crate::export::{ExportSettings, Precision};
