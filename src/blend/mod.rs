@@ -23,17 +23,19 @@ mod origin;
 mod pairs;
 mod parts;
 mod realise;
+mod report;
 mod thinned;
 mod weights;
 
 pub use clamp::Clamp;
-pub use correspondence::{BlendDeviation, BlendSettings, CorrespondenceReport};
+pub use correspondence::BlendSettings;
 pub use file::BlendFileError;
 pub use order::Order;
 pub use origin::{Origin, Reduction};
 pub use pairs::PairReport;
 pub(crate) use parts::Part;
 pub use realise::Realised;
+pub use report::{BlendDeviation, CorrespondenceReport};
 pub use weights::{RealisationWeights, WeightError};
 
 use correspondence::correspond;
