@@ -4,14 +4,12 @@
 //! what is seen. Here the paints are joined again, as they were and exactly, at the angles of the six instrument
 //! geometries alone, and both blends are read at equal weights: six slices, whatever the size of the paints.
 
-use super::clustering::luminance_of;
-use super::geometries::{Geometry, geometries, mixed};
-use super::sparkle::{lit_from, off_by};
+use super::geometries::{Geometry, geometries};
+use super::seen::Seen;
 use crate::blend::{
     Blend, BlendDeviation, BlendError, BlendSettings, Ingredient, RealisationWeights,
 };
-use crate::color::{Lab, ciede2000};
-use crate::paint::{AngleGrid, CarPaint, LightnessMixture, Slice};
+use crate::paint::{AngleGrid, CarPaint};
 use crate::transport::{Cost, Method};
 
 /// A blend at equal weights beside the blend by exact transport of the distance, at the six instrument geometries.
@@ -53,16 +51,12 @@ pub fn blend_deviation(
         ) else {
             continue;
         };
-        let (found, best) = (seen(&geometry, &found), seen(&geometry, &best));
+        let noticed = seen(&geometry, &found).beside(&seen(&geometry, &best));
         deviations.push(BlendDeviation {
             aspecular_deg: geometry.aspecular_deg,
-            delta_e_2000: ciede2000(found.color, best.color),
-            sparkle: if best.top.abs() > 1e-9 {
-                (found.top / best.top - 1.0).abs()
-            } else {
-                0.0
-            },
-            lit: Some(off_by(found.lit, best.lit)),
+            delta_e_2000: noticed.delta_e_2000,
+            sparkle: noticed.sparkle,
+            lit: Some(noticed.lit),
         });
     }
     Ok(deviations)
@@ -79,30 +73,11 @@ fn even(
     Ok(blend.realise(&weights).ok().map(|realised| realised.paint))
 }
 
-/// What is seen of a paint at a geometry.
-struct Seen {
-    color: Lab,
-    /// Luminance that one texel in a thousand exceeds.
-    top: f64,
-    /// Share of lit texels.
-    lit: f64,
-}
-
 /// What is seen of a paint whose only slice is the one here.
 fn seen(geometry: &Geometry, paint: &CarPaint) -> Seen {
-    let Some(flakes) = &paint.flakes else {
-        return Seen {
-            color: geometry.lab([0.0; 3]),
-            top: 0.0,
-            lit: 0.0,
-        };
-    };
-    let parts: Vec<(f64, Slice<'_>)> = vec![(1.0, flakes.slice_at(0))];
-    let mean = mixed(parts.iter().map(|(w, slice)| (*w, slice.mean())));
-    let mixture = LightnessMixture::of(&parts);
-    Seen {
-        color: geometry.lab(mean),
-        top: luminance_of(mixture.quantile(super::clustering::SPARKLE)),
-        lit: mixture.above(lit_from(geometry, mean)),
-    }
+    let slice = paint
+        .flakes
+        .as_ref()
+        .map(|flakes| (1.0, flakes.slice_at(0)));
+    Seen::of(geometry, slice.as_slice())
 }

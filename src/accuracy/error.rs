@@ -102,17 +102,22 @@ impl ResultError {
 }
 
 impl SeenError {
-    /// Of clusters against pixels, where both were compared and no angle was left out since.
+    /// Of clusters against pixels, and of the angles that were left out since.
     fn of_clusters(clustering: Option<&Clustering>) -> Option<Self> {
-        let clustering = clustering.filter(|own| own.left_out_w1.is_none())?;
+        let clustering = clustering?;
         let error = clustering.error.as_ref()?;
-        Some(Self {
+        let of_clusters = Self {
             aspecular_deg: ASPECULAR_DEG,
             delta_e_2000: error.instrument,
             lit: error.lit?,
             sparkle: error.sparkle.p90,
             how: SEEN,
-        })
+        };
+        if clustering.left_out_w1.is_none() {
+            return Some(of_clusters);
+        }
+        let seen = clustering.left_out_seen?;
+        Some(of_clusters.and(&seen.delta_e_2000, &seen.lit, &seen.sparkle))
     }
 
     /// The worse of two, figure by figure.
@@ -162,8 +167,8 @@ fn each(mut all: [f64; 6], others: &[f64], of: impl Fn(f64, f64) -> f64) -> [f64
 /// What the sum of weights' sizes of a mixture may be above 1 by rounding.
 const WITHIN: f64 = 1e-9;
 
-const SEEN: &str = "measured step by step and added up: clusters against pixels, of several paints the worst; a blend against exact \
-                    transport, at equal weights; a file against the paint";
+const SEEN: &str = "measured step by step and added up: clusters against pixels, and fewer angles against all, of several paints the \
+                    worst; a blend against exact transport, at equal weights; a file against the paint";
 
 const CLUSTERS: &str = "measured: W1 of lightness between pixels and clusters, nine of ten of the compared slices are within; \
                         of several paints the worst";
@@ -291,7 +296,7 @@ fn clusters<'a>(of: impl Iterator<Item = Option<&'a Clustering>>) -> Term {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::paint::{ClusteringError, Percentiles};
+    use crate::paint::{ClusteringError, LeftOutSeen, Percentiles};
 
     fn clustering(color: f64, lit: Option<f64>, sparkle: f64) -> Clustering {
         let at_p90 = |p90| Percentiles {
@@ -304,6 +309,7 @@ mod tests {
             angle_step: 1,
             w1_bound: None,
             left_out_w1: None,
+            left_out_seen: None,
             error: Some(ClusteringError {
                 slices: 20,
                 of: 100,
@@ -344,6 +350,17 @@ mod tests {
             ..clustering(0.1, Some(0.1), 0.0)
         };
         assert!(seen(&thinned).is_none());
+        let known = Clustering {
+            left_out_seen: Some(LeftOutSeen {
+                delta_e_2000: [0.5; 6],
+                sparkle: [0.25, 0.125, 0.0, 0.0, 0.0, 0.0],
+                lit: [0.25; 6],
+            }),
+            ..thinned
+        };
+        let known = seen(&known).expect("measured");
+        assert_eq!((known.delta_e_2000, known.sparkle), ([0.6; 6], 0.25));
+        assert_eq!(known.lit, [0.35; 6]);
         let whole = seen(&clustering(0.1, Some(0.1), 0.0)).expect("measured");
         assert!(whole.and_transport(&deviations(None)).is_none());
         assert!(whole.and_transport(&deviations(Some(0.0))[1..]).is_none());

@@ -73,7 +73,8 @@ pub struct Knobs {
         skip_serializing_if = "Option::is_none"
     )]
     pub cost: Option<CostKnob>,
-    /// Order in which more than two paints are joined: `canonical` or `cheapest`.
+    /// Order in which more than two paints are joined: `canonical`, by content hash; the `cheapest` of all; or `sampled`,
+    /// the cheapest as a few slices tell.
     #[serde(
         default,
         deserialize_with = "read::order",
@@ -112,7 +113,7 @@ fn accepted(knob: &str) -> &'static str {
         "transport" => "exact, sinkhorn or greedy",
         "epsilon" => "1e-6 to 10",
         "cost" => "distance or squared",
-        "order" => "canonical or cheapest",
+        "order" => "canonical, sampled or cheapest",
         "precision" => "f32, f16 or 8bit",
         "draw" => "alias, inverse_cdf or both",
         _ => "1 to 4096",

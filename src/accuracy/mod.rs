@@ -13,6 +13,7 @@ mod error;
 mod geometries;
 mod knobs;
 mod profile;
+mod seen;
 mod sparkle;
 pub mod study;
 mod thinning;
@@ -24,5 +25,5 @@ pub use error::{ResultError, SeenError, Term, blend_error, bundle_error, file_er
 pub use knobs::{CostKnob, Draw, Knobs, Preset, ProfileError, Transport};
 pub use profile::{PRESETS, Profile};
 pub use sparkle::{Sparkle, sparkle};
-pub use thinning::left_out_w1;
+pub use thinning::{left_out_seen, left_out_w1};
 pub use writing::{WritingError, writing_error};

@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::geometries::slices_at;
-use crate::paint::{Flakes, LightnessMixture, Percentiles};
+use super::geometries::{Geometry, geometries, slices_at};
+use super::seen::{Noticed, Seen};
+use crate::paint::{CarPaint, Flakes, LeftOutSeen, LightnessMixture, Percentiles};
 
 /// Most slices that are compared.
 const CHECKED: usize = 64;
@@ -41,10 +42,39 @@ pub fn left_out_w1(flakes: &Flakes, step: usize) -> Percentiles {
     Percentiles::of(distances)
 }
 
+/// What keeping every k-th angle changes at the six instrument geometries: each is a mixture of other slices then. `None`
+/// for a solid color.
+#[must_use]
+pub fn left_out_seen(paint: &CarPaint, step: usize) -> Option<LeftOutSeen> {
+    let flakes = paint.flakes.as_ref()?;
+    let kept = flakes.thinned(step);
+    let at = |geometry: &Geometry, flakes: &Flakes| {
+        let met = geometry.slices(&flakes.theta_h, &flakes.theta_d);
+        let parts: Vec<_> = met
+            .into_iter()
+            .map(|(weight, k)| (weight, flakes.slice_at(k)))
+            .collect();
+        Seen::of(geometry, &parts)
+    };
+    let noticed: Vec<Noticed> = geometries(paint)
+        .iter()
+        .map(|geometry| at(geometry, &kept).beside(&at(geometry, flakes)))
+        .collect();
+    let of = |get: fn(&Noticed) -> f64| -> Option<[f64; 6]> {
+        let all: Vec<f64> = noticed.iter().map(get).collect();
+        all.try_into().ok()
+    };
+    Some(LeftOutSeen {
+        delta_e_2000: of(|own| own.delta_e_2000)?,
+        sparkle: of(|own| own.sparkle)?,
+        lit: of(|own| own.lit)?,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::paint::{AngleGrid, FlakeTexture};
+    use crate::paint::{AngleGrid, ColorTable, FlakeTexture};
 
     /// Five by one slices of one box each, a unit wide, as light as these.
     fn flakes(lightness: [f32; 5]) -> Flakes {
@@ -78,5 +108,30 @@ mod tests {
         // The darker half of 10..11, at 10.25 in the mean, goes to 0..1; the lighter to 20..21.
         let w1 = left_out_w1(&flakes([0.0, 10.0, 20.0, 20.0, 20.0]), 2);
         assert!((w1.worst - 9.75).abs() < 1e-6, "{w1:?}");
+    }
+
+    #[test]
+    fn the_geometries_that_lose_their_slice_are_told_and_no_others() {
+        // Light at 45 degrees: θh of -15° aspecular is 7.5, of 110° it is 55 degrees.
+        let paint = |lightness| CarPaint {
+            coat: None,
+            diffuse: [0.1; 3],
+            lobes: Vec::new(),
+            color_table: ColorTable::white(),
+            flakes: Some(flakes(lightness)),
+        };
+        let seen = left_out_seen(&paint([30.0; 5]), 2).expect("flakes");
+        assert!(
+            seen.delta_e_2000.into_iter().all(|off| off < 1e-9),
+            "{seen:?}"
+        );
+        assert!(seen.lit.into_iter().all(|off| off < 1e-9), "{seen:?}");
+        // The slice at 5 degrees is as dark as its neighbours no more.
+        let seen = left_out_seen(&paint([30.0, 80.0, 30.0, 30.0, 30.0]), 2).expect("flakes");
+        assert!(seen.delta_e_2000[0] > 5.0, "{seen:?}");
+        assert!(seen.sparkle[0] > 0.3, "{seen:?}");
+        for at in 3..6 {
+            assert!(seen.delta_e_2000[at] < 1e-9, "{seen:?}");
+        }
     }
 }

@@ -2,13 +2,12 @@
 
 use serde::Serialize;
 
-use super::clustering::luminance_of;
-use super::geometries::{geometries, mixed};
-use super::sparkle::{lit_from, off_by};
+use super::geometries::geometries;
+use super::seen::Seen;
 use crate::blend::{Blend, Boxes};
-use crate::color::{ciede2000, luminance};
+use crate::color::luminance;
 use crate::export::{ExportSettings, Rounding, inverse_cdf};
-use crate::paint::{CarPaint, LightnessMixture, Slice, mean_color};
+use crate::paint::{CarPaint, Slice, mean_color};
 
 /// How far a file is from the paint that it was written from, over the slices of the six instrument geometries.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -70,24 +69,10 @@ pub fn writing_error(paint: &CarPaint, settings: &ExportSettings) -> Option<Writ
                 loss = loss.max(inverse_cdf(slice.probability, &light).probability_loss);
             }
         }
-        let mean =
-            |parts: &[(f64, Slice<'_>)]| mixed(parts.iter().map(|(w, slice)| (*w, slice.mean())));
-        let shine = |parts: &[(f64, Slice<'_>)]| {
-            let mixture = LightnessMixture::of(parts);
-            let top = luminance_of(mixture.quantile(super::clustering::SPARKLE));
-            (top, mixture.above(lit_from(&geometry, mean(parts))))
-        };
-        let ((exact, lit), (top, lit_as_written)) = (shine(&slices), shine(&rounded));
-        error.sparkle.push(if exact.abs() > 1e-9 {
-            (top / exact - 1.0).abs()
-        } else {
-            0.0
-        });
-        error.lit.push(off_by(lit_as_written, lit));
-        let reading = |parts| geometry.lab(mean(parts));
-        error
-            .instrument
-            .push(ciede2000(reading(&slices), reading(&rounded)));
+        let noticed = Seen::of(&geometry, &rounded).beside(&Seen::of(&geometry, &slices));
+        error.instrument.push(noticed.delta_e_2000);
+        error.sparkle.push(noticed.sparkle);
+        error.lit.push(noticed.lit);
     }
     error.inverse_cdf_loss = settings.inverse_cdf.then_some(loss);
     Some(error)

@@ -1,8 +1,8 @@
 //! The correspondence of several paints' flakes, slice by slice, by optimal transport.
 //!
 //! Two paints are transported onto each other; of their blend the realisation at equal weights is transported onto the
-//! third, and so on (Golla and Klein 2018, 4.3), in the order of content hashes or in the cheapest of all orders
-//! ([`Order`]). Every entry of a plan becomes a cluster with one probability and one box per paint. Clusters are kept in
+//! third, and so on (Golla and Klein 2018, 4.3), in the order of content hashes or in the cheapest of all orders, told by
+//! all slices or by a few ([`Order`]). Every entry of a plan becomes a cluster with one probability and one box per paint. Clusters are kept in
 //! the order of their lightness at equal weights: that order never depends on the weights of a realisation, so nothing
 //! flickers when they change.
 
@@ -20,7 +20,7 @@ use crate::paint::{AngleGrid, CarPaint, FlakeTexture};
 use crate::transport::{Cost, Method, Plan, Problem, Solver, TransportError, Workspace};
 
 /// How correspondences are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlendSettings {
     /// Solver of each slice.
@@ -30,6 +30,16 @@ pub struct BlendSettings {
     /// Order in which more than two paints are joined.
     #[serde(default)]
     pub order: Order,
+}
+
+impl Default for BlendSettings {
+    fn default() -> Self {
+        Self {
+            method: Method::default(),
+            cost: Cost::default(),
+            order: Order::Sampled,
+        }
+    }
 }
 
 /// One slice's corresponding clusters: probabilities, and boxes paint by paint.
@@ -103,8 +113,13 @@ pub(super) fn correspond(
     };
     let count = grid.slices();
     let tried = orders(paints.len(), settings.order);
+    let telling = settings.order.telling(count, tried.len());
     let done = AtomicUsize::new(0);
-    let all = count * tried.len();
+    let all = if tried.len() > 1 && telling.len() < count {
+        telling.len() * tried.len() + count
+    } else {
+        count * tried.len()
+    };
     let tell = || {
         let so_far = done.fetch_add(1, Ordering::Relaxed) + 1;
         if so_far.is_multiple_of(64) || so_far == all {
@@ -112,21 +127,17 @@ pub(super) fn correspond(
             progress(so_far as f32 / all as f32);
         }
     };
-    let mut best: Option<(f64, Vec<usize>, Vec<SliceBlend>)> = None;
-    let several = tried.len() > 1;
-    for order in tried {
-        let slices = join_in_order(paints, &order, grid, settings, &tell)?;
-        let cost = if several {
-            slices.iter().map(|s| s.pairwise_cost(settings.cost)).sum()
-        } else {
-            0.0
-        };
-        // Of equals the first, which is the canonical order where it is among them.
-        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-            best = Some((cost, order, slices));
+    let join = |order: &[usize], on: &[usize]| join(paints, order, (grid, on), settings, &tell);
+    let whole: Vec<usize> = (0..count).collect();
+    let (order, slices) = match tried.as_slice() {
+        [only] => (only.clone(), join(only, &whole)?),
+        several => {
+            let (order, told) = cheapest(several, settings.cost, |order| join(order, &telling))?;
+            let few = telling.len() < count;
+            let slices = if few { join(&order, &whole)? } else { told };
+            (order, slices)
         }
-    }
-    let (_, order, slices) = best.unwrap_or_default();
+    };
     let pairs = pair_reports(paints, &slices, grid, settings, &order)?;
 
     let total: usize = slices.iter().map(|s| s.probability.len()).sum();
@@ -187,17 +198,35 @@ fn boxes_of(place: usize, slices: &[SliceBlend], total: usize) -> Boxes {
     all
 }
 
-/// All slices with the paints joined in this order; boxes stay in the paints' own order.
-fn join_in_order(
+/// The order whose slices cost least, and those; of equals the first.
+fn cheapest(
+    orders: &[Vec<usize>],
+    cost: Cost,
+    join: impl Fn(&[usize]) -> Result<Vec<SliceBlend>, BlendError>,
+) -> Result<(Vec<usize>, Vec<SliceBlend>), BlendError> {
+    let mut best: Option<(f64, Vec<usize>, Vec<SliceBlend>)> = None;
+    for order in orders {
+        let slices = join(order)?;
+        let cost = slices.iter().map(|s| s.pairwise_cost(cost)).sum();
+        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
+            best = Some((cost, order.clone(), slices));
+        }
+    }
+    let (_, order, slices) = best.unwrap_or_default();
+    Ok((order, slices))
+}
+
+/// The slices at these places, with the paints joined in this order; boxes stay in the paints' own order.
+fn join(
     paints: &[&CarPaint],
     order: &[usize],
-    grid: Grid<'_>,
+    (grid, places): (Grid<'_>, &[usize]),
     settings: &BlendSettings,
     tell: &(dyn Fn() + Sync),
 ) -> Result<Vec<SliceBlend>, BlendError> {
-    let slices: Vec<_> = (0..grid.slices())
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, k| {
+    let slices: Vec<_> = places
+        .par_iter()
+        .map_init(Scratch::default, |scratch, &k| {
             let slice = blend_slice(paints, order, grid.angles(k), settings, scratch);
             tell();
             slice.map_err(|source| grid.refused(k, source))

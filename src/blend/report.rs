@@ -30,7 +30,7 @@ pub struct CorrespondenceReport {
     pub mean_cost: f64,
     /// Largest gap of a slice between its plan and the dual bound: no plan is further from optimal.
     pub largest_gap: f64,
-    /// Slices that [`Method::Sinkhorn`] had to smooth more than asked, to converge.
+    /// Slices that [Sinkhorn](crate::transport::Method::Sinkhorn) had to smooth more than asked, to converge.
     #[serde(default, skip_serializing_if = "is_none")]
     pub smoothed_more: usize,
     /// Order in which the paints were joined, by place in hash order.

@@ -6,13 +6,13 @@ use clap::Args;
 use serde_json::json;
 
 use super::ingest::ReadingArgs;
-use super::made::{self, Stages};
+use super::made;
 use super::output;
 use super::profile::TargetArgs;
 use super::progress::Progress;
 use crate::accuracy::blend_error;
 use crate::blend::PAINTS;
-use crate::workshop::{Work, WorkshopError, blend_paints, describe_blend, open_paints};
+use crate::workshop::{Laps, Work, WorkshopError, blend_paints, describe_blend, open_paints};
 
 /// Find how the flakes of 2 to 5 paints become one another, and keep it as a .blend.
 ///
@@ -52,7 +52,7 @@ impl Blend {
         if let Some(picked) = &picked {
             options.profile = *picked.profile();
         }
-        let mut stages = Stages::begin();
+        let mut stages = Laps::begin();
         let progress = Progress::reading(&self.inputs.join(", "));
         let paints = open_paints(&self.inputs, &options, &|share| progress.at(share))?;
         drop(progress);
@@ -67,7 +67,7 @@ impl Blend {
         output::replace(&self.out, &made.blend.to_bytes()?)?;
         drop(progress);
         stages.end("write");
-        stages.write(self.timings.as_deref())?;
+        made::write_seconds(self.timings.as_deref(), stages)?;
         let names: Vec<&str> = made.blend.ingredients().map(|(name, _)| name).collect();
         if json {
             let correspondence = &describe_blend(&made.blend)["correspondence"];

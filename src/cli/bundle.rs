@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::ingest::ReadingArgs;
-use super::made::{self, Stages};
+use super::made;
 use super::output;
 use super::profile::TargetArgs;
-use crate::workshop::{Work, WorkshopError, bundle_blend, open};
+use crate::workshop::{Laps, Work, WorkshopError, bundle_blend, open};
 
 /// Write the texture bundle of a whole blend: its shader mixes the paints, so that sliders need no further request.
 ///
@@ -37,7 +37,7 @@ impl Bundle {
             );
             return Err(WorkshopError::usage("--out", problem));
         }
-        let mut stages = Stages::begin();
+        let mut stages = Laps::begin();
         let mut options = ReadingArgs::default().options(None, &self.target.profile)?;
         let blend = open(&self.input, &options, &|_| ())?;
         stages.end("open");
@@ -51,11 +51,11 @@ impl Bundle {
         if picked.is_some() {
             stages.end("search");
         }
-        let made = bundle_blend(&blend, &options.profile)?;
-        stages.end("bundle");
+        let mut made = bundle_blend(&blend, &options.profile)?;
+        stages.end_with(std::mem::take(&mut made.stages));
         output::replace(&self.out, &made.bytes)?;
         stages.end("write");
-        stages.write(self.timings.as_deref())?;
+        made::write_seconds(self.timings.as_deref(), stages)?;
         let size = made::size_and_error(&made);
         made::tell(json, &self.out, &made, picked.as_ref(), &size)
     }

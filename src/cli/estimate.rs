@@ -9,11 +9,11 @@ use serde_json::json;
 use super::ingest::ReadingArgs;
 use super::number::whole;
 use super::output;
-use super::preview::FrameArgs;
+use super::preview::{FrameArgs, ShowName, refuse_samples_of_angles};
 use super::profile::TargetArgs;
 use super::weights::WeightArgs;
 use crate::workshop::{
-    Estimate as Estimated, Format, IngestOptions, PictureFormat, PictureWork, PreviewOptions, Show,
+    Estimate as Estimated, Format, IngestOptions, PictureFormat, PictureWork, PreviewOptions,
     Stage, Work, WorkshopError, open, read_environment, sample_to_estimate,
 };
 
@@ -81,6 +81,24 @@ enum What {
         weights: WeightArgs,
         #[command(flatten)]
         frame: FrameArgs,
+        /// What is shown on it: the paint, or the aspecular angles.
+        #[arg(
+            long,
+            value_enum,
+            value_name = "WHAT",
+            default_value = "paint",
+            allow_hyphen_values = true
+        )]
+        show: ShowName,
+        /// What is to be written.
+        #[arg(
+            long,
+            value_enum,
+            value_name = "FORMAT",
+            default_value = "png",
+            allow_hyphen_values = true
+        )]
+        format: PictureName,
         /// A panorama to light it with, .hdr or .exr, in place of the built-in studio.
         #[arg(long, value_name = "FILE")]
         environment: Option<PathBuf>,
@@ -99,6 +117,21 @@ enum FormatName {
     Glb,
     Json,
     Paint,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PictureName {
+    Png,
+    Exr,
+}
+
+impl From<PictureName> for PictureFormat {
+    fn from(name: PictureName) -> Self {
+        match name {
+            PictureName::Png => Self::Png,
+            PictureName::Exr => Self::Exr,
+        }
+    }
 }
 
 impl Estimate {
@@ -192,10 +225,13 @@ impl Estimate {
                 input,
                 weights,
                 frame,
+                show,
+                format,
                 environment,
                 spp,
-                ..
+                target,
             } => {
+                refuse_samples_of_angles(*show, *spp, target, input)?;
                 let (mut opened, thing) = sample_to_estimate(input, options)?;
                 let weights = weights.for_thing(&thing)?;
                 let begun = Instant::now();
@@ -209,7 +245,7 @@ impl Estimate {
                 let mut profile = options.profile;
                 profile.samples_per_pixel = spp.unwrap_or(profile.samples_per_pixel);
                 let view = PreviewOptions {
-                    show: Show::Paint,
+                    show: (*show).into(),
                     scene: frame.scene.into(),
                     size: [frame.size.width, frame.size.height],
                     samples_per_pixel: profile.samples_per_pixel,
@@ -220,7 +256,7 @@ impl Estimate {
                     thing: &thing,
                     weights: weights.as_ref(),
                     options: &view,
-                    format: PictureFormat::Png,
+                    format: (*format).into(),
                     limits: &options.limits,
                     written: true,
                 });

@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::made::{self, Stages};
+use super::made;
 use super::number::{real, whole};
 use super::profile::{ProfileArgs, TargetArgs};
 use super::progress::Progress;
 use super::{output, show};
 use crate::measurement::{Layout, ReadOptions, ThetaHSpacing};
 use crate::workshop::{
-    IngestOptions, Source, Work, WorkshopError, describe_paint, find, ingest_in_stages,
+    IngestOptions, Laps, Source, Work, WorkshopError, describe_paint, find, ingest_in_stages,
 };
 
 const A_CSV: &str = "\
@@ -157,13 +157,13 @@ impl Ingest {
             options.profile = *picked.profile();
         }
         let progress = Progress::new("ingesting");
-        let stages = RefCell::new(Stages::begin());
+        let stages = RefCell::new(Laps::begin());
         let ended = |stage| stages.borrow_mut().end(stage);
         let paint = ingest_in_stages(&path, &options, &|share| progress.at(share), &ended)?;
         output::replace(&self.out, &paint.to_bytes()?)?;
         ended("write");
         drop(progress);
-        stages.borrow().write(self.timings.as_deref())?;
+        made::write_seconds(self.timings.as_deref(), stages.into_inner())?;
         if json {
             return output::print_json(
                 &json!({ "out": self.out.display().to_string(), "profile": options.profile.name(), "picked": picked, "paint": describe_paint(&paint) }),

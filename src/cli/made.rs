@@ -1,50 +1,26 @@
 //! What a command tells about the file it made, and how long the stages took.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde_json::{Map, json};
 
 use super::output;
 use crate::paint::Clamp;
-use crate::workshop::{Made, Picked, WorkshopError};
+use crate::workshop::{Laps, Made, Picked, WorkshopError};
 
-/// The seconds of a command's stages.
-#[derive(Debug)]
-pub struct Stages {
-    begun: Instant,
-    ended: Vec<(&'static str, Duration)>,
-}
-
-impl Stages {
-    /// The first stage begins.
-    pub fn begin() -> Self {
-        Self {
-            begun: Instant::now(),
-            ended: Vec::new(),
-        }
+/// Writes the seconds of each stage and of all, where there is a file for them.
+pub fn write_seconds(timings: Option<&Path>, laps: Laps) -> Result<(), WorkshopError> {
+    let Some(timings) = timings else {
+        return Ok(());
+    };
+    let stages = laps.into_stages();
+    let total: Duration = stages.iter().map(|(_, time)| *time).sum();
+    let mut seconds = Map::new();
+    for (stage, time) in stages.into_iter().chain([("total", total)]) {
+        seconds.insert(stage.to_owned(), json!(time.as_secs_f64()));
     }
-
-    /// A stage is over, the next begins.
-    pub fn end(&mut self, stage: &'static str) {
-        self.ended.push((stage, self.begun.elapsed()));
-    }
-
-    /// Writes the seconds of each and of all, where there is a file for them.
-    pub fn write(&self, timings: Option<&Path>) -> Result<(), WorkshopError> {
-        let Some(timings) = timings else {
-            return Ok(());
-        };
-        let mut seconds = Map::new();
-        let mut before = Duration::ZERO;
-        for &(stage, end) in &self.ended {
-            let own = end.saturating_sub(before);
-            seconds.insert(stage.to_owned(), json!(own.as_secs_f64()));
-            before = end;
-        }
-        seconds.insert("total".to_owned(), json!(before.as_secs_f64()));
-        output::replace(timings, json!(seconds).to_string().as_bytes())
-    }
+    output::replace(timings, json!(seconds).to_string().as_bytes())
 }
 
 /// How large a file is, and how far off where that is known.

@@ -6,15 +6,15 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 
 use super::ingest::ReadingArgs;
-use super::made::{self, Stages};
+use super::made;
 use super::number::whole;
 use super::output;
 use super::profile::TargetArgs;
 use super::progress::Progress;
 use super::weights::WeightArgs;
 use crate::workshop::{
-    PictureFormat, PictureWork, PreviewOptions, Shape, Show, Source, Work, WorkshopError, find,
-    open, preview, read_environment,
+    Laps, PictureFormat, PictureWork, PreviewOptions, Shape, Show, Source, Work, WorkshopError,
+    find, open, preview, read_environment,
 };
 
 /// Draw a paint, a blend at given weights, or a sample.
@@ -137,48 +137,53 @@ impl FromStr for Size {
     }
 }
 
-impl Preview {
-    /// An option that would be ignored is refused.
-    fn refuse_samples_of_angles(&self) -> Result<(), WorkshopError> {
-        let given = [
-            ("--spp", self.spp.is_some()),
-            ("--max-error", self.target.max_error.is_some()),
-            ("--max-seconds", self.target.max_seconds.is_some()),
-        ];
-        let refused = |option: &str, why: &str| {
-            let problem = format!(
-                "{option} beside --show aspecular: angles follow from the scene, {why}; leave the option out"
-            );
-            Err(WorkshopError::usage(option, problem))
-        };
-        let args = &self.target.profile;
-        if self.show != ShowName::Aspecular {
-            return Ok(());
-        }
-        if let Some((option, _)) = given.iter().find(|(_, is)| *is) {
-            return refused(option, "without samples");
-        }
-        let turned = args.knobs.iter().find_map(|knobs| knobs.samples_per_pixel);
-        if let Some(samples) = turned {
-            let option = format!("--knob samples_per_pixel={samples}");
-            return refused(&option, "without samples");
-        }
-        if let Some(samples) = args.knobs()?.samples_per_pixel {
-            let option = format!("--profile with samples_per_pixel={samples}");
-            return refused(&option, "without samples");
-        }
-        // A sample is made with a profile, a file is what it is.
-        if args.is_given() && !matches!(find(&self.input)?, Source::Sample(_)) {
-            return refused("--profile", "whatever the profile of a paint in a file");
-        }
-        Ok(())
+/// An option that would be ignored is refused.
+pub fn refuse_samples_of_angles(
+    show: ShowName,
+    spp: Option<u32>,
+    target: &TargetArgs,
+    input: &str,
+) -> Result<(), WorkshopError> {
+    if show != ShowName::Aspecular {
+        return Ok(());
     }
+    let given = [
+        ("--spp", spp.is_some()),
+        ("--max-error", target.max_error.is_some()),
+        ("--max-seconds", target.max_seconds.is_some()),
+    ];
+    let refused = |option: &str, why: &str| {
+        let problem = format!(
+            "{option} beside --show aspecular: angles follow from the scene, {why}; leave the option out"
+        );
+        Err(WorkshopError::usage(option, problem))
+    };
+    if let Some((option, _)) = given.iter().find(|(_, is)| *is) {
+        return refused(option, "without samples");
+    }
+    let args = &target.profile;
+    let turned = args.knobs.iter().find_map(|knobs| knobs.samples_per_pixel);
+    if let Some(samples) = turned {
+        let option = format!("--knob samples_per_pixel={samples}");
+        return refused(&option, "without samples");
+    }
+    if let Some(samples) = args.knobs()?.samples_per_pixel {
+        let option = format!("--profile with samples_per_pixel={samples}");
+        return refused(&option, "without samples");
+    }
+    // A sample is made with a profile, a file is what it is.
+    if args.is_given() && !matches!(find(input)?, Source::Sample(_)) {
+        return refused("--profile", "whatever the profile of a paint in a file");
+    }
+    Ok(())
+}
 
+impl Preview {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        self.refuse_samples_of_angles()?;
+        refuse_samples_of_angles(self.show, self.spp, &self.target, &self.input)?;
         let options = ReadingArgs::default().options(None, &self.target.profile)?;
         let format = PictureFormat::of_path(&self.out)?;
-        let mut stages = Stages::begin();
+        let mut stages = Laps::begin();
         let progress = Progress::reading(&self.input);
         let thing = open(&self.input, &options, &|share| progress.at(share))?;
         drop(progress);
@@ -216,7 +221,7 @@ impl Preview {
             stages.end("search");
         }
         let progress = Progress::new("drawing");
-        let made = preview(
+        let mut made = preview(
             &thing,
             weights.as_ref(),
             &wanted,
@@ -224,11 +229,11 @@ impl Preview {
             &options.limits,
             &|share| progress.at(share),
         )?;
-        stages.end("draw");
+        stages.end_with(std::mem::take(&mut made.stages));
         output::replace(&self.out, &made.bytes)?;
         drop(progress);
         stages.end("write");
-        stages.write(self.timings.as_deref())?;
+        made::write_seconds(self.timings.as_deref(), stages)?;
         let noise = made.report.pointer("/rendering/sampling/mean_delta_e");
         let noise = noise.and_then(serde_json::Value::as_f64);
         let size = format!(

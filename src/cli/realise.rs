@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::ingest::ReadingArgs;
-use super::made::{self, Stages};
+use super::made;
 use super::output;
 use super::profile::TargetArgs;
 use super::progress::Progress;
 use super::weights::WeightArgs;
-use crate::workshop::{Format, Work, WorkshopError, open, realise};
+use crate::workshop::{Format, Laps, Work, WorkshopError, open, realise};
 
 /// Take a realisation of a blend: a texture bundle, a GLB, a material.json, or a .paint.
 ///
@@ -34,7 +34,7 @@ pub struct Realise {
 
 impl Realise {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
-        let mut stages = Stages::begin();
+        let mut stages = Laps::begin();
         let mut options = ReadingArgs::default().options(None, &self.target.profile)?;
         let format = Format::of_path(&self.out)?;
         let progress = Progress::reading(&self.input);
@@ -54,11 +54,11 @@ impl Realise {
         if picked.is_some() {
             stages.end("search");
         }
-        let made = realise(&thing, weights.as_ref(), format, &options.profile)?;
-        stages.end("realise");
+        let mut made = realise(&thing, weights.as_ref(), format, &options.profile)?;
+        stages.end_with(std::mem::take(&mut made.stages));
         output::replace(&self.out, &made.bytes)?;
         stages.end("write");
-        stages.write(self.timings.as_deref())?;
+        made::write_seconds(self.timings.as_deref(), stages)?;
         let size = made::size_and_error(&made);
         made::tell(json, &self.out, &made, picked.as_ref(), &size)
     }

@@ -132,6 +132,7 @@ pub fn fit_flakes(
             fitted.iter().map(|s| s.clusters.w1_bound).collect(),
         )),
         left_out_w1: None,
+        left_out_seen: None,
         error: None,
         realised_lab: None,
     };

@@ -7,7 +7,7 @@ use super::energy::EnergyCertificate;
 use super::finite::{NotFinite, check_corners, check_list};
 use super::{
     AngleGrid, CarPaint, ClusteringError, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes,
-    Limits, Lobe, PaintError, Percentiles, ReadingResiduals, Realisation,
+    LeftOutSeen, Limits, Lobe, PaintError, Percentiles, ReadingResiduals, Realisation,
 };
 use crate::color::{Lab, LinearRgb};
 
@@ -64,6 +64,9 @@ pub struct Clustering {
     /// them, Lab units; only of a paint that was thinned for a blend.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left_out_w1: Option<Percentiles>,
+    /// What of that would be noticed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_out_seen: Option<LeftOutSeen>,
     /// How far the clusters are from the pixels, where it was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<ClusteringError>,

@@ -53,8 +53,8 @@ pub(crate) use magnitude::largest_magnitude;
 pub use realisation::{Clamp, Realisation};
 pub use reflectance::{Chi, Reflectance, Terms};
 pub use residuals::{
-    ClusteringError, FitResiduals, InstrumentError, LuminanceError, Percentiles, ReadingError,
-    ReadingResiduals,
+    ClusteringError, FitResiduals, InstrumentError, LeftOutSeen, LuminanceError, Percentiles,
+    ReadingError, ReadingResiduals,
 };
 pub use shared_list::SharedList;
 pub(crate) use sparkle::pcg;

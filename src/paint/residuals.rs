@@ -92,6 +92,18 @@ pub struct ClusteringError {
     pub lit: Option<[f64; 6]>,
 }
 
+/// What leaving out angles changes at the six instrument geometries.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LeftOutSeen {
+    /// CIEDE2000 of the mean color, base included.
+    pub delta_e_2000: [f64; 6],
+    /// Relative difference of the 99.9th percentile of the flakes' luminance.
+    pub sparkle: [f64; 6],
+    /// Relative difference of how many flakes are lit, fewer than one texel in a thousand counted as that many.
+    pub lit: [f64; 6],
+}
+
 /// A list of errors in three numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

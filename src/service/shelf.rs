@@ -220,8 +220,9 @@ impl App {
                 .ingredients()
                 .map(|(name, _)| name.to_owned())
                 .collect();
+            let notes = works.notes(&blend, &options.profile);
             let thing = Thing::Blend(Box::new(blend));
-            let links = documents::of_blend(&id, &paints, &options);
+            let links = documents::of_blend(&id, &paints, &options, &notes);
             let document = documents::described(&id, works.describe(&thing), links);
             Ok(Shelved {
                 id,

@@ -1,7 +1,8 @@
 //! Blending paints: those with too many clusters are reduced first.
 
 use super::WorkshopError;
-use crate::accuracy::{Profile, blend_deviation, left_out_w1};
+use super::describing::blend_notes;
+use crate::accuracy::{Profile, blend_deviation, left_out_seen, left_out_w1};
 use crate::blend::{Blend, BlendError, Ingredient, Origin, Reduction};
 use crate::fit::{ClusterSettings, reduce_clusters};
 use crate::paint::{CarPaint, Clamp, Clustering, Flakes, PaintFile};
@@ -26,12 +27,9 @@ pub fn blend_paints(
     profile: &Profile,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Blended, WorkshopError> {
-    let mut notes: Vec<String> = (paints.iter())
-        .filter_map(|file| clustered_otherwise(file, &profile.flakes))
-        .collect();
     let reduced: Vec<Option<CarPaint>> = paints
         .iter()
-        .map(|file| reduced(file, &profile.flakes, &mut notes))
+        .map(|file| reduced(file, &profile.flakes))
         .collect();
     let ingredients: Vec<Ingredient<'_>> = paints
         .iter()
@@ -77,29 +75,7 @@ pub fn blend_paints(
     let blend = blend
         .with_origins(origins)
         .with_accuracy(deviation, &clusterings);
-    let report = blend.report();
-    let named = |place: usize| {
-        let asked = blend.asked_at(place).and_then(|k| paints.get(k));
-        asked.map_or("", |file| file.name.as_str())
-    };
-    if report.smoothed_more > 0 {
-        notes.push(format!(
-            "{} of {} slices were smoothed more than epsilon says, to converge; the gap tells what that costs",
-            report.smoothed_more, report.slices
-        ));
-    }
-    for &place in &report.mixed {
-        notes.push(format!(
-            "{}: its angles differ from the common grid of {} slices; slices in between are mixtures of their neighbours",
-            named(place), report.slices
-        ));
-    }
-    for &place in &report.without_flakes {
-        notes.push(format!(
-            "{}: has no flakes and counts as black ones",
-            named(place)
-        ));
-    }
+    let notes = blend_notes(&blend, profile);
     Ok(Blended { blend, notes })
 }
 
@@ -126,22 +102,13 @@ fn clustering_of(file: &PaintFile, wanted: &ClusterSettings) -> Option<Clusterin
         left_out_w1: (step > 1)
             .then(|| left_out_w1(flakes, step))
             .or(clustering.left_out_w1),
+        left_out_seen: if step > 1 {
+            left_out_seen(&file.paint, step)
+        } else {
+            clustering.left_out_seen
+        },
         realised_lab,
         ..clustering
-    })
-}
-
-/// Says so of a paint that was clustered otherwise than the profile would: clusters are made when it is ingested.
-fn clustered_otherwise(file: &PaintFile, wanted: &ClusterSettings) -> Option<String> {
-    let had = file.clustering.as_ref()?;
-    let rule = wanted.box_rule.name();
-    let other = had.clusters != wanted.clusters || had.box_rule != rule;
-    (other && !file.provenance.is_blend()).then(|| {
-        format!(
-            "{}: is clustered as it was ingested, with {} clusters a slice and {} boxes; the profile's {} and {rule} are for \
-             measurements",
-            file.name, had.clusters, had.box_rule, wanted.clusters
-        )
     })
 }
 
@@ -158,33 +125,12 @@ fn wants_fewer(file: &PaintFile, flakes: &Flakes, wanted: &ClusterSettings) -> b
 
 /// The paint as the profile wants it: with fewer angles if it was fitted at more, and, if it came from a blend and has
 /// more clusters, with fewer of those.
-fn reduced(
-    file: &PaintFile,
-    wanted: &ClusterSettings,
-    notes: &mut Vec<String>,
-) -> Option<CarPaint> {
+fn reduced(file: &PaintFile, wanted: &ClusterSettings) -> Option<CarPaint> {
     let flakes = file.paint.flakes.as_ref()?;
     let step = angle_step(file, wanted);
-    let thinned = (step > 1).then(|| {
-        let thinned = flakes.thinned(step);
-        notes.push(format!(
-            "{}: {} of {} flake slices were used, one angle in {step} on either grid",
-            file.name,
-            thinned.slices(),
-            flakes.slices(),
-        ));
-        thinned
-    });
+    let thinned = (step > 1).then(|| flakes.thinned(step));
     let flakes = thinned.as_ref().unwrap_or(flakes);
-    let fewer = wants_fewer(file, flakes, wanted).then(|| {
-        notes.push(format!(
-            "{}: up to {} clusters a slice were reduced to {}",
-            file.name,
-            flakes.widest_slice(),
-            wanted.clusters
-        ));
-        reduce_clusters(flakes, wanted.clusters)
-    });
+    let fewer = wants_fewer(file, flakes, wanted).then(|| reduce_clusters(flakes, wanted.clusters));
     fewer.or(thinned).map(|flakes| CarPaint {
         flakes: Some(flakes),
         ..file.paint.clone()

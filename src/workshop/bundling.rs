@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::describing::describe_correspondence;
-use super::{Made, Thing, WorkshopError};
+use super::{Laps, Made, Thing, WorkshopError};
 use crate::accuracy::{Profile, bundle_error};
 use crate::blend::Blend;
 use crate::export::{self, About};
@@ -28,6 +28,7 @@ pub fn bundle_blend(thing: &Thing, profile: &Profile) -> Result<Made, WorkshopEr
 }
 
 fn of_blend(blend: &Blend, profile: &Profile) -> Result<Made, WorkshopError> {
+    let mut laps = Laps::begin();
     let (names, hashes): (Vec<&str>, Vec<&str>) = blend.ingredients().unzip();
     let report = json!({
         "paints": names,
@@ -36,6 +37,7 @@ fn of_blend(blend: &Blend, profile: &Profile) -> Result<Made, WorkshopError> {
         // At weights between 0 and 1 that sum to 1.
         "accuracy": { "error": bundle_error(blend, &profile.export) },
     });
+    laps.end("error");
     let about = About {
         name: names.join(" + "),
         provenance: Provenance {
@@ -47,9 +49,11 @@ fn of_blend(blend: &Blend, profile: &Profile) -> Result<Made, WorkshopError> {
         report: report.clone(),
     };
     let bytes = export::blend_bundle(blend, &about, &profile.export)?;
+    laps.end("encode");
     Ok(Made {
         bytes,
         report,
         notes: Vec::new(),
+        stages: laps.into_stages(),
     })
 }

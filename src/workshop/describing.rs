@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::accuracy::{blend_error, paint_error, sparkle};
+use crate::accuracy::{Profile, blend_error, paint_error, sparkle};
 use crate::blend::{Blend, Order};
 use crate::export::readings;
 use crate::paint::{ASPECULAR_DEG, PaintFile};
@@ -72,7 +72,10 @@ pub(super) fn describe_correspondence(blend: &Blend) -> Value {
     correspondence["reduced"] = reduced.into();
     // Weights follow the order asked for; the paints are joined in this one.
     correspondence["order"] = match blend.settings().order {
+        // Of two there is but one.
         Order::Canonical => "content hash".into(),
+        _ if report.order.len() < 3 => "content hash".into(),
+        Order::Sampled => "cheapest on a few slices".into(),
         Order::Cheapest => "cheapest".into(),
     };
     correspondence["joined"] = told(&report.order).into();
@@ -80,6 +83,64 @@ pub(super) fn describe_correspondence(blend: &Blend) -> Value {
         correspondence["pairs"][k]["paints"] = told(&pair.paints).into();
     }
     correspondence
+}
+
+/// What the caller of a blend with this profile should know: what the profile could not turn any more, what was reduced,
+/// mixed or smoothed.
+#[must_use]
+pub fn blend_notes(blend: &Blend, profile: &Profile) -> Vec<String> {
+    let (wanted, report) = (&profile.flakes, blend.report());
+    let mut notes = Vec::new();
+    let of_each = blend.ingredients().zip(blend.clusterings());
+    for (((name, _), clustering), origin) in of_each.zip(blend.origins()) {
+        let rule = wanted.box_rule.name();
+        if let Some(had) = clustering
+            && had.realised_lab.is_none()
+            && had.box_rule != "blended"
+            && (had.clusters != wanted.clusters || had.box_rule != rule)
+        {
+            notes.push(format!(
+                "{name}: is clustered as it was ingested, with {} clusters a slice and {} boxes; the profile's {} and {rule} \
+                 are for measurements",
+                had.clusters, had.box_rule, wanted.clusters
+            ));
+        }
+        if let Some(had) = clustering
+            && had.left_out_w1.is_some()
+        {
+            notes.push(format!(
+                "{name}: one flake angle in {} on either grid was used",
+                had.angle_step
+            ));
+        }
+        if let Some(by) = &origin.reduced {
+            notes.push(format!(
+                "{name}: up to {} clusters a slice were reduced to {}",
+                by.from, by.to
+            ));
+        }
+    }
+    if report.smoothed_more > 0 {
+        notes.push(format!(
+            "{} of {} slices were smoothed more than epsilon says, to converge; the gap tells what that costs",
+            report.smoothed_more, report.slices
+        ));
+    }
+    let names: Vec<&str> = blend.ingredients().map(|(name, _)| name).collect();
+    let named = |place: usize| blend.asked_at(place).map_or("", |k| names[k]);
+    for &place in &report.mixed {
+        notes.push(format!(
+            "{}: its angles differ from the common grid of {} slices; slices in between are mixtures of their neighbours",
+            named(place), report.slices
+        ));
+    }
+    for &place in &report.without_flakes {
+        notes.push(format!(
+            "{}: has no flakes and counts as black ones",
+            named(place)
+        ));
+    }
+    notes
 }
 
 /// Ingredients, settings and correspondence of a blend.

@@ -13,6 +13,7 @@ mod error;
 mod estimate;
 mod evaluating;
 mod ingest;
+mod laps;
 mod previewing;
 mod reading;
 mod realising;
@@ -26,7 +27,7 @@ pub use crate::export::{CXF_MEDIA_TYPE, Gloss, Readings, companions_hash};
 pub use crate::render::{Environment, EnvironmentError, EnvironmentFile, EnvironmentFormat, Shape};
 pub use blending::{Blended, blend_paints};
 pub use bundling::bundle_blend;
-pub use describing::{describe_blend, describe_paint};
+pub use describing::{blend_notes, describe_blend, describe_paint};
 pub use error::{Fault, Inside, WorkshopError, accepted};
 pub use estimate::{
     Estimate, EstimatedError, PictureWork, Stage, Work, learn_machine, sample_to_estimate,
@@ -36,6 +37,7 @@ pub use ingest::{
     BareMeasurement, IngestOptions, Measurement, NAME_CHARACTERS, ReadingsUpload, check_clusters,
     ingest, ingest_in_stages, ingest_upload, is_paint_file, open_measurement,
 };
+pub use laps::{Lap, Laps};
 pub use previewing::{
     Light, MOST_SAMPLES, PictureFormat, PreviewOptions, Show, preview, read_environment, texels,
 };

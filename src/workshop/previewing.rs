@@ -7,7 +7,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 use super::realising::{Made, check, choose, error_of};
-use super::{Thing, WorkshopError, read};
+use super::{Laps, Thing, WorkshopError, read};
 use crate::blend::RealisationWeights;
 use crate::paint::{CarPaint, Limits};
 use crate::render::{
@@ -143,13 +143,17 @@ pub fn preview(
         check(thing, weights)?;
         return angles(&scene, format, limits, progress);
     }
+    let mut laps = Laps::begin();
     let chosen = choose(thing, weights)?;
+    laps.end("realise");
     let rendering = render::render(&chosen.paint, &scene, limits, progress).map_err(refused)?;
+    laps.end("draw");
     let bytes = match format {
         PictureFormat::Png => rendering.film.to_png(),
         PictureFormat::Exr => rendering.film.to_exr(),
     }
     .map_err(WorkshopError::internal)?;
+    laps.end("encode");
     let report = json!({
         "realisation": chosen.report,
         "rendering": rendering.report,
@@ -165,6 +169,7 @@ pub fn preview(
         bytes,
         report,
         notes,
+        stages: laps.into_stages(),
     };
     Ok(with_held(made, &scene))
 }
@@ -189,16 +194,20 @@ fn angles(
     limits: &Limits,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Made, WorkshopError> {
+    let mut laps = Laps::begin();
     let map = render::aspecular(scene, limits, progress).map_err(refused)?;
+    laps.end("draw");
     let bytes = match format {
         PictureFormat::Png => map.to_png(),
         PictureFormat::Exr => map.to_exr(),
     }
     .map_err(WorkshopError::internal)?;
+    laps.end("encode");
     let made = Made {
         bytes,
         report: json!({ "aspecular": map.report() }),
         notes: Vec::new(),
+        stages: laps.into_stages(),
     };
     Ok(with_held(made, scene))
 }

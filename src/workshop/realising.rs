@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use utoipa::ToSchema;
 
 use super::describing::describe_correspondence;
-use super::{Thing, WorkshopError};
+use super::{Lap, Laps, Thing, WorkshopError};
 use crate::accuracy::{
     Profile, ResultError, blend_error, file_error, paint_error, sparkle, writing_error,
 };
@@ -32,7 +32,7 @@ pub enum Format {
 }
 
 /// Bytes that were made, and what is known about them.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Made {
     /// The file.
     pub bytes: Vec<u8>,
@@ -40,6 +40,8 @@ pub struct Made {
     pub report: Value,
     /// The same for people, one line each.
     pub notes: Vec<String>,
+    /// How long each stage took.
+    pub stages: Vec<Lap>,
 }
 
 impl Format {
@@ -182,15 +184,21 @@ pub fn realise(
     format: Format,
     profile: &Profile,
 ) -> Result<Made, WorkshopError> {
+    let mut laps = Laps::begin();
     if let (Format::Paint, Thing::Paint(file)) = (format, thing) {
         let accuracy = accuracy(&paint_error(file), &file.paint, None);
+        laps.end("error");
+        let bytes = file.to_bytes()?;
+        laps.end("encode");
         return Ok(Made {
-            bytes: file.to_bytes()?,
+            bytes,
             report: json!({ "paint": file.name, "accuracy": accuracy }),
             notes: Vec::new(),
+            stages: laps.into_stages(),
         });
     }
     let mut chosen = choose(thing, weights)?;
+    laps.end("realise");
     // Viewers of a GLB see its material, whose own loss stands beside.
     let error = match format {
         Format::Glb => error_of(thing, weights).unseen(),
@@ -199,13 +207,14 @@ pub fn realise(
     // Only textures are rounded: a GLB and a .paint carry lists as they are.
     let textures = matches!(format, Format::Zip | Format::Json).then_some(&profile.export);
     chosen.report["accuracy"] = accuracy(&error, &chosen.paint, textures);
+    laps.end("error");
     let about = About {
         name: chosen.name.clone(),
         provenance: chosen.provenance.clone(),
         report: chosen.report.clone(),
     };
     let bytes = match format {
-        Format::Zip => export::bundle(&chosen.paint, &about, &profile.export),
+        Format::Zip => export::bundle(&chosen.paint, &about, &profile.export)?,
         Format::Glb => {
             let (bytes, loss) = export::glb_and_loss(&chosen.paint, &about)?;
             chosen.notes.push(format!(
@@ -214,23 +223,21 @@ pub fn realise(
                 loss.median, loss.worst
             ));
             chosen.report["accuracy"]["gltf_loss"] = json!(loss);
-            Ok(bytes)
+            bytes
         }
-        Format::Json => export::material_json(&chosen.paint, &about, &profile.export),
+        Format::Json => export::material_json(&chosen.paint, &about, &profile.export)?,
         Format::Paint => {
             let file = paint_file(&chosen, &error);
             chosen.notes.extend(file.warnings.iter().cloned());
-            return Ok(Made {
-                bytes: file.to_bytes()?,
-                report: chosen.report,
-                notes: chosen.notes,
-            });
+            file.to_bytes()?
         }
-    }?;
+    };
+    laps.end("encode");
     Ok(Made {
         bytes,
         report: chosen.report,
         notes: chosen.notes,
+        stages: laps.into_stages(),
     })
 }
 
@@ -265,6 +272,7 @@ fn paint_file(chosen: &Chosen, error: &ResultError) -> PaintFile {
         angle_step: 1,
         w1_bound: None,
         left_out_w1: None,
+        left_out_seen: None,
         error: None,
         realised_lab: error.lab,
     });

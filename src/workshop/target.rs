@@ -1,8 +1,9 @@
 //! A target in place of knobs: the cheapest profile that is accurate enough, or the most accurate that is fast enough.
 //!
 //! The profiles of a short ladder are estimated on the work itself, from cheap to dear: for an error until one will do, for
-//! a time as long as looking further takes little of it. Where an estimate's error is of a sample of the slices, the error is measured in full
-//! before a profile is picked for it. What is picked for a time limit depends on the machine; the result depends on the profile picked and on nothing else.
+//! a time as long as looking further takes little of it. Where an estimate's error is of a sample of the slices, the
+//! error is measured in full before a profile is picked for it, unless the part of it that is known is too much already.
+//! What is picked for a time limit depends on the machine; the result depends on the profile picked and on nothing else.
 
 mod ladder;
 mod samples;
@@ -168,7 +169,8 @@ impl Target {
         for profile in ladder(work) {
             let mut estimate = work.estimate(&profile)?;
             let too_slow = !self.is_in_time(&estimate, search.seconds());
-            if !too_slow {
+            let too_far = (self.max_error).is_some_and(|most| estimate.error.at_least > most);
+            if !too_slow && !too_far {
                 measure_error(work, &profile, &mut estimate)?;
             }
             let enough = self.is_met(&estimate, search.seconds());
@@ -310,6 +312,7 @@ mod tests {
             error: EstimatedError {
                 value: Some(error),
                 unit: "Lab",
+                at_least: 0.0,
             },
         }
     }

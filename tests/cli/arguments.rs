@@ -114,7 +114,10 @@ fn a_silly_knob_is_refused_with_its_name_and_range_wherever_it_stands() {
             "epsilon is \"inf\", accepted is 1e-6 to 10",
         ),
         ("cost=3", "cost is 3, accepted is distance or squared"),
-        ("order=", "order is \"\", accepted is canonical or cheapest"),
+        (
+            "order=",
+            "order is \"\", accepted is canonical, sampled or cheapest",
+        ),
         (
             "draw=dice",
             "draw is \"dice\", accepted is alias, inverse_cdf or both",

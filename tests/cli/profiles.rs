@@ -141,6 +141,32 @@ fn an_estimate_knows_the_bytes_and_the_error_of_what_then_happens() {
     assert!((stated - lab).abs() < 1e-6, "{stated} {lab}");
 }
 
+/// Files of angles grow more slowly than their pixels, those in linear light as fast.
+#[test]
+fn an_estimate_knows_the_bytes_of_every_picture() {
+    let desk = Desk::new();
+    for (show, ending) in [("aspecular", "png"), ("aspecular", "exr"), ("paint", "exr")] {
+        let scene = ["sample:bmw339", "--show", show, "--size", "400x300"];
+        let scene = match show {
+            "paint" => [&scene[..], &["--spp", "4"]].concat(),
+            _ => scene.to_vec(),
+        };
+        let estimate = [
+            &["estimate", "preview"],
+            &scene[..],
+            &["--format", ending, "--json"],
+        ];
+        let estimate = json(&desk.ok(&estimate.concat()).stdout);
+        let out = format!("x.{ending}");
+        desk.ok(&[&["preview"], &scene[..], &["--out", &out]].concat());
+        let ratio = estimate["bytes"].as_f64().expect("bytes") / desk.read(&out).len() as f64;
+        assert!((0.7..1.4).contains(&ratio), "{show} {ending}: {ratio}");
+    }
+    let aside = "estimate preview sample:bmw339 --show aspecular --spp 4";
+    let refused = desk.refused(2, &aside.split(' ').collect::<Vec<_>>());
+    assert!(refused.contains("--spp"), "{refused}");
+}
+
 /// Both draw as many samples in all; of so few pixels nothing but their number tells drawing from getting ready.
 #[test]
 fn a_tiny_picture_of_many_samples_is_not_taken_for_a_large_one() {

@@ -159,8 +159,15 @@ async fn a_silly_field_is_refused_with_its_place_its_value_and_what_is_accepted(
             "/v1/estimates",
             estimated(r#""format":"zip""#),
             "/format",
-            "The work preview, of a paint, takes no format.",
-            "paint, scene, size, show, environment, lights",
+            "A preview is a picture; the work for other files is realise.",
+            "png or exr",
+        ),
+        (
+            "/v1/estimates",
+            estimated(r#""paints":[]"#),
+            "/paints",
+            "The work preview, of a paint, takes no paints.",
+            "paint, format, scene, size, show, environment, lights",
         ),
     ];
     for (path, body, pointer, detail, accepted) in cases {

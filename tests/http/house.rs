@@ -9,7 +9,7 @@ use carpaint::accuracy::Profile;
 use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
-    App, Asked, Estimate, Fault, Format, Gloss, IngestOrder, Picked, Picture, PictureFormat,
+    App, Asked, Estimate, Fault, Format, Gloss, IngestOrder, Made, Picked, Picture, PictureFormat,
     Progress, Readings, ServiceConfig, Target, Thing, View, Works, Workshop, WorkshopError, open,
     serve,
 };
@@ -112,7 +112,7 @@ impl Works for Pretend {
         weights: Option<&RealisationWeights>,
         format: Format,
         _: &Profile,
-    ) -> Result<Vec<u8>, WorkshopError> {
+    ) -> Result<Made, WorkshopError> {
         std::thread::sleep(Duration::from_millis(50));
         let diffuse = match thing {
             Thing::Paint(file) => file.paint.diffuse,
@@ -126,10 +126,15 @@ impl Works for Pretend {
                     .diffuse
             }
         };
-        Ok(format!("{format:?} {diffuse:?}").into_bytes())
+        Ok(Made {
+            bytes: format!("{format:?} {diffuse:?}").into_bytes(),
+            report: json!({}),
+            notes: Vec::new(),
+            stages: vec![("encode", Duration::from_millis(50))],
+        })
     }
 
-    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkshopError> {
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Made, WorkshopError> {
         carpaint::service::Workshop::new(carpaint::paint::Limits::default()).bundle(blend, profile)
     }
 
@@ -142,7 +147,9 @@ impl Works for Pretend {
         format: PictureFormat,
         progress: Progress<'_>,
     ) -> Result<Picture, WorkshopError> {
-        let paint = self.realise(thing, weights, Format::Json, &Profile::default())?;
+        let paint = self
+            .realise(thing, weights, Format::Json, &Profile::default())?
+            .bytes;
         // A tall picture takes its time.
         let begun = Instant::now();
         while view.size[1] == 4000 && begun.elapsed() < Duration::from_secs(4) {
@@ -153,6 +160,7 @@ impl Works for Pretend {
             bytes: [format!("{format:?} {view:?} ").into_bytes(), paint].concat(),
             accuracy: "sampling-mean-de2000=0.5".to_owned(),
             report: json!({ "clamps": [], "plan": "whatever" }),
+            stages: vec![("draw", begun.elapsed())],
         })
     }
 
@@ -183,6 +191,7 @@ impl Works for Pretend {
             error: EstimatedError {
                 value: Some(0.25),
                 unit: "Lab",
+                at_least: 0.0,
             },
         })
     }
@@ -201,6 +210,10 @@ impl Works for Pretend {
             tried: 2,
             searched: 0.0,
         })
+    }
+
+    fn notes(&self, _: &Blend, _: &Profile) -> Vec<String> {
+        Vec::new()
     }
 
     fn describe(&self, thing: &Thing) -> Value {

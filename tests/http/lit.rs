@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use carpaint::service::ServiceConfig;
 use serde_json::json;
 
+use crate::client::Answer;
 use crate::environments::{panorama, upload};
 use crate::folder;
 use crate::house::House;
@@ -57,6 +58,31 @@ async fn a_picture_is_lit_by_the_panorama_that_is_asked_for() {
         let problem = estimate(order).await.problem(422, "invalid-value");
         assert_eq!(problem["pointer"], format!("/{field}"), "{problem}");
         assert!(problem["accepted"].is_string(), "{problem}");
+    }
+    let written = async |work: &str, format: &str| {
+        let order = match work {
+            "preview" => {
+                json!({ "work": work, "paint": paint, "size": [24, 16], "format": format })
+            }
+            _ => json!({ "work": work, "paint": paint, "format": format }),
+        };
+        estimate(order).await
+    };
+    let (screen, linear) = (
+        written("preview", "png").await,
+        written("preview", "exr").await,
+    );
+    let bytes = |told: &Answer| told.json()["bytes"].as_u64().expect("bytes");
+    assert!(bytes(&linear) > bytes(&screen), "{}", linear.text());
+    for (work, format, accepted) in [
+        ("preview", "zip", "png or exr"),
+        ("realise", "png", "zip, glb, json or paint"),
+    ] {
+        let problem = written(work, format).await.problem(422, "invalid-value");
+        assert_eq!(
+            (&problem["pointer"], &problem["accepted"]),
+            (&json!("/format"), &json!(accepted))
+        );
     }
     let lit_from_above = json!({
         "work": "preview", "paint": paint, "size": [24, 16], "lights": [{"towards": [0, 1, 0]}],

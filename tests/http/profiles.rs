@@ -114,12 +114,14 @@ async fn profiles_are_names_or_knobs_and_targets_are_answered_with_what_was_pick
 
     let shipped = house.get("/v1/accuracy").await;
     assert_eq!(shipped.json()["format"], "carpaint study");
+    assert_eq!(shipped.header("carpaint-study"), Some("shipped"));
     let mut own = shipped.json();
     own["program"] = json!("of this house");
     let write = |text: &str| std::fs::write(data.path().join("study.json"), text).expect("written");
     write(&own.to_string());
-    let served = house.get("/v1/accuracy").await.json();
-    assert_eq!(served["program"], "of this house");
+    let served = house.get("/v1/accuracy").await;
+    assert_eq!(served.header("carpaint-study"), Some("installation"));
+    assert_eq!(served.json()["program"], "of this house");
     for none in ["{}", "[1, 2", r#"{"format": "of this house"}"#] {
         write(none);
         let served = house.get("/v1/accuracy").await;

@@ -8,6 +8,7 @@ use carpaint::fit::ClusterSettings;
 use carpaint::workshop::sample_by_name;
 use serde_json::{Value, json};
 
+use crate::client::Answer;
 use crate::house::House;
 
 /// A table in the layout of the MPI car paints: a wide lobe over a diffuse base.
@@ -64,6 +65,8 @@ async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again
     let blend = house.post_json("/v1/blends", &order.to_string()).await;
     assert_eq!(blend.status, 201, "{blend:?}");
     let blend = blend.json();
+    let notes = blend["notes"].to_string();
+    assert!(notes.contains("ford_f8: its angles differ"), "{notes}");
     let correspondence = &blend["correspondence"];
     assert_eq!(correspondence["order"], "content hash");
     assert_eq!(correspondence["mixed"][0]["name"], "ford_f8");
@@ -73,6 +76,19 @@ async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again
     let picture = "weights=3,-2&size=24x24&spp=1";
     let drawn = house.get(&format!("{base}/preview.png?{picture}")).await;
     assert_eq!((drawn.status, &drawn.body[..4]), (200, &b"\x89PNG"[..]));
+    let timed = |answer: &Answer, stages: &[&str]| {
+        let timing = answer.header("server-timing").expect("Server-Timing");
+        let named: Vec<&str> = timing
+            .split(", ")
+            .filter_map(|stage| stage.split(';').next())
+            .collect();
+        assert_eq!(named, stages);
+    };
+    timed(&drawn, &["realise", "draw", "encode", "preview", "total"]);
+    let again = house.get(&format!("{base}/preview.png?{picture}")).await;
+    timed(&again, &["preview", "total"]);
+    let whole = house.get(&format!("{base}/bundle.zip")).await;
+    timed(&whole, &["error", "encode", "bundle", "total"]);
     let report = house.get(&format!("{base}/preview.json?{picture}")).await;
     let report = report.json();
     let effects = report["rendering"]["effects"].as_array();
@@ -86,6 +102,10 @@ async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again
     let file = house
         .get(&format!("{base}/realisation.paint?weights=3,-2"))
         .await;
+    timed(
+        &file,
+        &["realise", "error", "encode", "realisation", "total"],
+    );
     let again = upload(&house, &file.body).await;
     assert_eq!(again["provenance"]["simulated_flakes"], true);
     assert_eq!(
@@ -99,6 +119,13 @@ async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again
     assert_eq!(
         (&reduced[0]["place"], &reduced[0]["to"]),
         (&json!(0), &json!(8))
+    );
+    let order = json!({ "paints": [fine["id"], coarse["id"]], "profile": "reference" });
+    let finest = house.post_json("/v1/blends", &order.to_string()).await;
+    let notes = finest.json()["notes"].to_string();
+    assert!(
+        notes.contains("bmw339: is clustered as it was ingested, with 8 clusters"),
+        "{notes}"
     );
     let order = json!({ "paints": [fine["id"], coarse["id"]], "clusters": 7 });
     let refused = house.post_json("/v1/blends", &order.to_string()).await;

@@ -94,6 +94,8 @@ fn of_transport(page: &mut Page, blend: &Blend) {
     let settings = blend.settings();
     let order = match settings.order {
         Order::Canonical => "by content hash",
+        _ if report.order.len() < 3 => "by content hash",
+        Order::Sampled => "the cheapest as a few slices tell",
         Order::Cheapest => "the cheapest of all",
     };
     let named = |value: Value| match value {

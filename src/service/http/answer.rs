@@ -146,6 +146,14 @@ impl Answer {
         self.stages.0.push((name.into(), time));
         self
     }
+
+    /// With what each of these stages took.
+    #[must_use]
+    pub fn stages(mut self, stages: &[(&'static str, Duration)]) -> Self {
+        let named = stages.iter().map(|&(name, time)| (name.into(), time));
+        self.stages.0.extend(named);
+        self
+    }
 }
 
 fn etag(hash: Hash) -> HeaderValue {

@@ -58,7 +58,7 @@ pub struct KnobsDocument {
     epsilon: Option<f64>,
     /// Cost of moving a color: `distance` in Lab, or `squared`.
     cost: Option<String>,
-    /// Order in which more than two paints are joined: `canonical` or `cheapest`.
+    /// Order in which more than two paints are joined: `canonical`, `sampled` or `cheapest`.
     order: Option<String>,
     /// Precision of textures: `f32`, `f16` or `8bit`.
     precision: Option<String>,

@@ -1,6 +1,6 @@
 //! The bundle of a whole blend: one request, and then sliders move without any.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use axum::extract::State;
@@ -48,7 +48,8 @@ pub async fn bundle(
         Some(_) => blend.keep().revalidated(),
         None => blend.keep(),
     };
-    let on = app.clone();
+    let took = Arc::new(OnceLock::new());
+    let (on, told) = (app.clone(), Arc::clone(&took));
     let compute = move || async move {
         let (works, counter) = (
             Arc::clone(&on.works),
@@ -58,13 +59,15 @@ pub async fn bundle(
             .bench
             .run(move || works.bundle(&blend.thing, &profile))
             .await?;
-        let bytes = made.map_err(Problem::of_query)?;
+        let made = made.map_err(Problem::of_query)?;
+        let _ = told.set(made.stages);
         counter.increment(1);
-        Ok(bytes.into())
+        Ok(made.bytes.into())
     };
     let result = app.results.get_or_compute(key, compute).await?;
     let answer = Answer::result("application/zip", result, keep).saved_as(&name);
     Ok(answer
         .picked_in(picked.as_ref(), searched)
+        .stages(took.get().map_or(&[], Vec::as_slice))
         .stage("bundle", begun.elapsed()))
 }

@@ -79,6 +79,8 @@ pub struct BlendDocument {
     /// Common angles and the paints' textures; null when no paint has flakes.
     #[schema(value_type = Option<Object>)]
     pub flakes: Value,
+    /// What the caller should know: knobs that could not be turned any more, slices that were mixed, reduced, smoothed.
+    pub notes: Vec<String>,
     /// What was asked for.
     #[schema(value_type = Object)]
     pub request: Value,
@@ -177,12 +179,13 @@ pub fn of_paint(record: &PaintRecord) -> Value {
 }
 
 /// What was asked for, and addresses of what can be made of it.
-pub fn of_blend(id: &str, paints: &[String], options: &BlendOptions) -> Value {
+pub fn of_blend(id: &str, paints: &[String], options: &BlendOptions, notes: &[String]) -> Value {
     let base = format!("/v1/blends/{id}");
     let weights =
         vec![(1.0 / f64::from(u32::try_from(paints.len()).unwrap_or(1))).to_string(); paints.len()]
             .join(",");
     json!({
+        "notes": notes,
         "request": { "paints": paints, "profile": options.profile.name(), "knobs": options.profile },
         "links": {
             "self": base,

@@ -62,6 +62,7 @@ struct Picture {
     of: Arc<Shelved>,
     weights: Option<RealisationWeights>,
     view: View,
+    format: PictureFormat,
     unread: Option<Unread>,
 }
 
@@ -170,7 +171,7 @@ impl Needed {
             }
             WorkName::Realise => {
                 let (of, weights) = order.named().find(app).await?;
-                let format = order.format.unwrap_or(Format::Zip);
+                let format = order.file()?;
                 Ok(Self::Realise(of, weights, format))
             }
             WorkName::Bundle => {
@@ -181,6 +182,7 @@ impl Needed {
                 Ok(Self::Bundle(blend))
             }
             WorkName::Preview => {
+                let format = order.picture()?;
                 let view = order.view(app, profile).await?;
                 let (of, weights) = order.named().find(app).await?;
                 let unread = app.unread(view.environment.as_deref()).await;
@@ -188,6 +190,7 @@ impl Needed {
                     of,
                     weights,
                     view,
+                    format,
                     unread: unread.map_err(Problem::in_body)?,
                 })))
             }
@@ -240,7 +243,7 @@ impl Needed {
                 weights: picture.weights.as_ref(),
                 view: &picture.view,
                 environment,
-                format: PictureFormat::Png,
+                format: picture.format,
             }),
         }
     }

@@ -267,5 +267,8 @@ fn answer(drawn: Drawn, format: PreviewFormat, picked: Option<&Picked>) -> Answe
         "" => answer,
         accuracy => answer.header(ACCURACY, accuracy),
     };
-    answer.picked(picked).stage("preview", drawn.time)
+    answer
+        .picked(picked)
+        .stages(&drawn.stages)
+        .stage("preview", drawn.time)
 }

@@ -1,6 +1,6 @@
 //! Realisations: a paint, or a blend at some weights, as a file that others use.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use axum::extract::State;
@@ -89,7 +89,8 @@ async fn realise(
     );
     let name = format!("{}.{}", thing.id, format.ending());
     let keep = thing.keep();
-    let on = app.clone();
+    let took = Arc::new(OnceLock::new());
+    let (on, told) = (app.clone(), Arc::clone(&took));
     let compute = move || async move {
         let (works, counter) = (
             Arc::clone(&on.works),
@@ -99,9 +100,10 @@ async fn realise(
             .bench
             .run(move || works.realise(&thing.thing, weights.as_ref(), format, &profile))
             .await?;
-        let bytes = made.map_err(Problem::of_query)?;
+        let made = made.map_err(Problem::of_query)?;
+        let _ = told.set(made.stages);
         counter.increment(1);
-        Ok(bytes.into())
+        Ok(made.bytes.into())
     };
     let result = app.results.get_or_compute(key, compute).await?;
     // What a target picks may change with the machine's load.
@@ -113,5 +115,6 @@ async fn realise(
     let answer = Answer::result(format.media_type(), result, keep).saved_as(&name);
     Ok(answer
         .picked_in(picked.as_ref(), searched)
+        .stages(took.get().map_or(&[], Vec::as_slice))
         .stage("realisation", begun.elapsed()))
 }

@@ -1,12 +1,12 @@
 //! Pictures: drawn once however many ask, and not to the end when nobody waits for them any more.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
 use super::workbench::call_off;
-use super::works::{Picture, PictureFormat, Show, View};
+use super::works::{Lap, Picture, PictureFormat, Show, View};
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::environments::Unread;
@@ -26,7 +26,9 @@ pub struct Drawn {
     pub picture: CachedResult,
     /// How long it may be kept.
     pub keep: Keep,
-    /// How long this took.
+    /// How long each stage took, where it was drawn now.
+    pub stages: Vec<Lap>,
+    /// How long all of this took, waiting for a place included.
     pub time: Duration,
 }
 
@@ -59,7 +61,9 @@ pub async fn draw(
     let (begun, keep) = (Instant::now(), thing.keep());
     let key = key(&thing, weights.as_ref(), &view, format);
     let _waits = app.watchers.watch(key);
+    let took = Arc::new(OnceLock::new());
     let kept = loop {
+        let told = Arc::clone(&took);
         let (on, thing, weights) = (app.clone(), Arc::clone(&thing), weights.clone());
         let view = view.clone();
         let compute = move || async move {
@@ -79,7 +83,10 @@ pub async fn draw(
                 let (thing, weights, light) =
                     (&thing.thing, weights.as_ref(), environment.as_deref());
                 let drawn = works.preview(thing, weights, &view, light, format, &progress);
-                Ok(kept_form(&drawn.map_err(Problem::of_query)?))
+                let drawn = drawn.map_err(Problem::of_query)?;
+                let kept = kept_form(&drawn);
+                let _ = told.set(drawn.stages);
+                Ok(kept)
             });
             let Ok(drawn) = drawn.await? else {
                 return Err(Problem::new(
@@ -106,6 +113,7 @@ pub async fn draw(
         report,
         picture,
         keep,
+        stages: took.get().cloned().unwrap_or_default(),
         time: begun.elapsed(),
     })
 }

@@ -28,8 +28,8 @@ pub use runner::Jobs;
 pub use watchers::Watchers;
 pub use workbench::{Workbench, call_off};
 pub use works::{
-    Asked, CXF_MEDIA_TYPE, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Picked,
-    Picture, PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing, View,
-    Works, WorkshopError,
+    Asked, CXF_MEDIA_TYPE, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Made,
+    Picked, Picture, PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing,
+    View, Works, WorkshopError,
 };
 pub use workshop::Workshop;

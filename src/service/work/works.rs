@@ -16,8 +16,8 @@ pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
 pub use crate::measurement::{Layout, ThetaHSpacing};
 pub use crate::workshop::{
-    CXF_MEDIA_TYPE, Estimate, Fault, Format, Gloss, Light, Picked, PictureFormat, Readings, Shape,
-    Show, Target, Thing, WorkshopError,
+    CXF_MEDIA_TYPE, Estimate, Fault, Format, Gloss, Lap, Light, Made, Picked, PictureFormat,
+    Readings, Shape, Show, Target, Thing, WorkshopError,
 };
 
 /// How an upload becomes a paint.
@@ -104,7 +104,7 @@ pub enum Asked<'a> {
 }
 
 /// A picture with the account of its accuracy.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Picture {
     /// The file.
     pub bytes: Vec<u8>,
@@ -112,6 +112,8 @@ pub struct Picture {
     pub accuracy: String,
     /// What was drawn and what was left out, what had to be clamped.
     pub report: Value,
+    /// How long each stage took.
+    pub stages: Vec<Lap>,
 }
 
 /// The pieces of work.
@@ -152,14 +154,14 @@ pub trait Works: Debug + Send + Sync {
         weights: Option<&RealisationWeights>,
         format: Format,
         profile: &Profile,
-    ) -> Result<Vec<u8>, WorkshopError>;
+    ) -> Result<Made, WorkshopError>;
 
     /// All paints of a blend become one texture bundle.
     ///
     /// # Errors
     ///
     /// [`WorkshopError`] for a thing that is no blend.
-    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkshopError>;
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Made, WorkshopError>;
 
     /// A paint, or a blend at some weights, becomes a picture, lit by the environment that the view names.
     ///
@@ -218,6 +220,9 @@ pub trait Works: Debug + Send + Sync {
     ///
     /// [`WorkshopError`] for a target that is none, and what would be refused when the work is done.
     fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkshopError>;
+
+    /// What the caller of a blend with this profile should know.
+    fn notes(&self, blend: &Blend, profile: &Profile) -> Vec<String>;
 
     /// What is known about a paint or a blend.
     fn describe(&self, thing: &Thing) -> Value;

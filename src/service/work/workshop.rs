@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Asked, Estimate, Format, Gloss, IngestOrder, Picked, Picture, PictureFormat, Progress,
+    Asked, Estimate, Format, Gloss, IngestOrder, Made, Picked, Picture, PictureFormat, Progress,
     Readings, Target, Thing, View, Works,
 };
 use crate::accuracy::Profile;
@@ -132,12 +132,12 @@ impl Works for Workshop {
         weights: Option<&RealisationWeights>,
         format: Format,
         profile: &Profile,
-    ) -> Result<Vec<u8>, WorkshopError> {
-        Ok(workshop::realise(thing, weights, format, profile)?.bytes)
+    ) -> Result<Made, WorkshopError> {
+        workshop::realise(thing, weights, format, profile)
     }
 
-    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Vec<u8>, WorkshopError> {
-        Ok(workshop::bundle_blend(blend, profile)?.bytes)
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Made, WorkshopError> {
+        workshop::bundle_blend(blend, profile)
     }
 
     fn preview(
@@ -165,6 +165,7 @@ impl Works for Workshop {
             bytes: made.bytes,
             accuracy: accuracy.join(", "),
             report: made.report,
+            stages: made.stages,
         })
     }
 
@@ -194,6 +195,10 @@ impl Works for Workshop {
 
     fn pick(&self, asked: &Asked<'_>, target: &Target) -> Result<Picked, WorkshopError> {
         self.with_work(asked, |work| target.pick(work))
+    }
+
+    fn notes(&self, blend: &Blend, profile: &Profile) -> Vec<String> {
+        workshop::blend_notes(blend, profile)
     }
 
     fn describe(&self, thing: &Thing) -> Value {

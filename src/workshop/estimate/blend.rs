@@ -108,6 +108,12 @@ fn of_samples(
         });
         stages.extend(write_stage(bytes));
     }
-    let error = EstimatedError::lab(blend_error(&large.1).lab);
+    let error = blend_error(&large.1);
+    // Clusters were compared on the very slices that they will be compared on; the other terms are of a sample.
+    let clusters = error.terms.iter().find(|term| term.what == "clusters");
+    let error = EstimatedError {
+        at_least: clusters.and_then(|term| term.lab).unwrap_or(0.0),
+        ..EstimatedError::lab(error.lab)
+    };
     Ok(Estimate::new(profile, stages, bytes, error))
 }

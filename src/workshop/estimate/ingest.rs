@@ -148,6 +148,7 @@ pub(super) fn of_paint(paint: PaintFile, profile: &Profile, sizes: Sizes, second
             clustering: paint.clustering.clone().map(|c| Clustering {
                 angle_step: c.angle_step.max(profile.flakes.angle_step),
                 left_out_w1: (step > 1).then(|| left_out_w1(flakes, step)),
+                left_out_seen: None,
                 ..c
             }),
             ..paint.clone()

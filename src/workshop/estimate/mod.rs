@@ -62,12 +62,18 @@ pub struct EstimatedError {
     pub value: Option<f64>,
     /// Of what: `Lab` (misplaced colors of flakes) or `CIEDE2000` (mean over a picture's pixels, by sampling).
     pub unit: &'static str,
+    /// What it will be at least, where a part of it is known already as it will be measured.
+    #[serde(skip)]
+    pub at_least: f64,
 }
 
 impl EstimatedError {
     fn lab(value: Option<f64>) -> Self {
-        let unit = "Lab";
-        Self { value, unit }
+        Self {
+            value,
+            unit: "Lab",
+            at_least: 0.0,
+        }
     }
 }
 

@@ -14,6 +14,9 @@ const SIDES: [u32; 3] = [20, 56, 160];
 /// The same for who looks through profiles.
 const SEARCHING_SIDES: [u32; 2] = [20, 96];
 
+/// The same for angles, which take no samples to draw, and whose files grow more slowly than their pixels.
+const SIDES_OF_ANGLES: [u32; 2] = [160, 320];
+
 /// How much longer a larger sample has to take, to tell drawing from getting ready.
 const LONGER: f64 = 3.0;
 
@@ -93,6 +96,7 @@ impl SmallPictures {
         let error = EstimatedError {
             value: error,
             unit: "CIEDE2000",
+            at_least: 0.0,
         };
         let drawn_with = Profile {
             samples_per_pixel: options.samples_per_pixel,
@@ -225,7 +229,12 @@ pub fn estimate_preview(
 ) -> Result<Estimate, WorkshopError> {
     let samples = work.with(profile.samples_per_pixel).samples_per_pixel;
     let few = samples.min(2 * ENOUGH);
-    let small = SmallPictures::draw(work, few, &SIDES, |of| shortest(|| work.draw(&of)))?;
+    let sides: &[u32] = if work.options.show.is_paint() {
+        &SIDES
+    } else {
+        &SIDES_OF_ANGLES
+    };
+    let small = SmallPictures::draw(work, few, sides, |of| shortest(|| work.draw(&of)))?;
     let error = work.error_of(samples)?;
     Ok(small.estimate(work, profile, Some(error)))
 }

@@ -8,7 +8,7 @@ use crate::service::app::App;
 use crate::service::http::Problem;
 use crate::service::parameters::view::{self, Names, Side};
 use crate::service::parameters::{Named, ProfileDocument, ProfileText, WeightQuery};
-use crate::service::work::{Format, Light, Shape, Show, View};
+use crate::service::work::{Format, Light, PictureFormat, Shape, Show, View};
 
 /// Work to estimate.
 #[derive(Debug, Deserialize, ToSchema)]
@@ -32,8 +32,8 @@ pub struct EstimateOrder {
     flake_color: Option<Vec<f64>>,
     /// Factor on the flakes' color.
     flake_saturation: Option<f64>,
-    /// File to write, `zip` unless given.
-    pub format: Option<Format>,
+    /// What is written: of `realise` a file, `zip` unless given; of `preview` a picture, `png` unless given.
+    pub format: Option<FormatName>,
     /// What the paint is on, `sphere` unless given.
     scene: Option<Shape>,
     /// Pixels across and down of a picture, 512 each unless given.
@@ -75,6 +75,24 @@ pub enum WorkName {
     Preview,
 }
 
+/// What is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FormatName {
+    /// Texture bundle.
+    Zip,
+    /// glTF binary.
+    Glb,
+    /// `material.json` with the textures inline.
+    Json,
+    /// A `.paint`.
+    Paint,
+    /// Picture for a screen.
+    Png,
+    /// Picture in linear light.
+    Exr,
+}
+
 const OF_BLEND: [&str; 6] = [
     "blend",
     "weights",
@@ -84,7 +102,15 @@ const OF_BLEND: [&str; 6] = [
     "flake_saturation",
 ];
 
-const OF_PICTURE: [&str; 6] = ["paint", "scene", "size", "show", "environment", "lights"];
+const OF_PICTURE: [&str; 7] = [
+    "paint",
+    "format",
+    "scene",
+    "size",
+    "show",
+    "environment",
+    "lights",
+];
 
 impl EstimateOrder {
     /// Refuses a field that the work does not have: it would be an answer to another question.
@@ -129,6 +155,42 @@ impl EstimateOrder {
             )
             .accepting(taken.join(", "))),
             None => Ok(()),
+        }
+    }
+
+    /// The file that a realisation is written as.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] for a picture.
+    pub fn file(&self) -> Result<Format, Problem> {
+        match self.format.unwrap_or(FormatName::Zip) {
+            FormatName::Zip => Ok(Format::Zip),
+            FormatName::Glb => Ok(Format::Glb),
+            FormatName::Json => Ok(Format::Json),
+            FormatName::Paint => Ok(Format::Paint),
+            FormatName::Png | FormatName::Exr => Err(Problem::value(
+                "/format",
+                "A realisation is no picture; the work for one is preview.",
+            )
+            .accepting("zip, glb, json or paint")),
+        }
+    }
+
+    /// What a picture is written as.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] for a file that is none.
+    pub fn picture(&self) -> Result<PictureFormat, Problem> {
+        match self.format.unwrap_or(FormatName::Png) {
+            FormatName::Png => Ok(PictureFormat::Png),
+            FormatName::Exr => Ok(PictureFormat::Exr),
+            _ => Err(Problem::value(
+                "/format",
+                "A preview is a picture; the work for other files is realise.",
+            )
+            .accepting("png or exr")),
         }
     }
 

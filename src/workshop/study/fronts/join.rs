@@ -28,6 +28,7 @@ pub(in crate::workshop::study) fn join(
     for n in [12, 24, 50, 100] {
         for (order, called) in [
             (Order::Canonical, "canonical"),
+            (Order::Sampled, "sampled"),
             (Order::Cheapest, "cheapest"),
         ] {
             let profile = Profile {
