@@ -15,7 +15,7 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
-use self::sums::{BLOCK, Seen, Weight, append_sums, sums};
+use self::sums::{BLOCK, Turned, Weight, append_sums, sums};
 use super::clamp::Ledger;
 use super::{BlendedFlakes, Boxes};
 use crate::paint::{MAX_LAB, largest_magnitude};
@@ -57,9 +57,9 @@ impl Account {
     }
 
     /// Counts what was put in order on its way.
-    fn turned(&mut self, seen: &Seen) {
-        self.inverted += seen.inverted as usize;
-        let widest = f32::from_bits(seen.widest.cast_unsigned());
+    fn turned(&mut self, turned: Turned) {
+        self.inverted += turned.count as usize;
+        let widest = f32::from_bits(turned.widest.cast_unsigned());
         self.narrowest = self.narrowest.min(-f64::from(widest));
     }
 }

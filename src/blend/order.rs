@@ -28,7 +28,7 @@ pub enum Order {
 }
 
 /// Joins of a slice that telling the cheapest order takes at most, as long as each order is tried on [`FEWEST`] slices.
-const TRIES: usize = 240;
+const TRIES: usize = 96;
 /// Slices that each order is tried on at least.
 const FEWEST: usize = 4;
 /// Slices that each order is tried on at most.
@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn few_slices_tell_of_many_orders_and_all_of_the_cheapest() {
-        for (orders, slices) in [(1, 24), (3, 24), (12, 20), (60, 4)] {
+        for (orders, slices) in [(1, 24), (3, 24), (12, 8), (60, 4)] {
             let telling = Order::Sampled.telling(576, orders);
             assert_eq!(telling.len(), slices);
             let gaps = telling.windows(2).map(|pair| pair[1] - pair[0]);

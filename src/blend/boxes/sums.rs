@@ -1,83 +1,71 @@
 //! The sums of a block: the loops that run at the speed of memory.
+//!
+//! A block stays in the nearest cache while it is summed, held against the bound and put in order, each by a loop of its
+//! own: short loops become vectors, one that did all of it would not.
 
 use super::Account;
 use crate::paint::MAX_LAB;
 
 /// Numbers of a block, a whole number of corners: the blocks of two paints and their weights stay in the nearest cache.
 pub(super) const BLOCK: usize = 768;
-/// Bits of a number without its sign, and those of the bound.
+/// Bits of a number without its sign.
 const MAGNITUDE: u32 = 0x7fff_ffff;
-#[allow(clippy::cast_possible_truncation)] // exact
-const BOUND: u32 = (MAX_LAB as f32).to_bits();
 
-/// What [`sums`] does, at the end of two lists. Two paints are summed on their way, each further one on top of them.
-#[inline(never)]
-pub(super) fn append_sums<const PAINTS: usize, const WATCH: bool>(
-    weights: [f32; PAINTS],
-    lower: [&[f32]; PAINTS],
-    upper: [&[f32]; PAINTS],
-    [low, high]: &mut [Vec<f32>; 2],
-) -> bool {
-    let first = low.len();
-    let (x, y) = (weights[0], weights[1]);
-    let sum = |(own, other): (&f32, &f32)| x * own + y * other;
-    low.extend(lower[0].iter().zip(lower[1]).map(sum));
-    let mut seen = Seen::default();
-    if PAINTS == 2 {
-        let pairs = upper[0].iter().zip(upper[1]).zip(&low[first..]);
-        high.extend(pairs.map(|(pair, &l)| {
-            let h = sum(pair);
-            seen.look::<WATCH, false>(l, h).1
-        }));
-        return seen.is_beyond();
-    }
-    high.extend(upper[0].iter().zip(upper[1]).map(sum));
-    let (low, high) = (&mut low[first..], &mut high[first..]);
-    for m in 2..PAINTS {
-        for (list, corners) in [(&mut *low, lower[m]), (&mut *high, upper[m])] {
-            for (sum, own) in list.iter_mut().zip(corners) {
-                *sum += weights[m] * own;
-            }
-        }
-    }
-    if WATCH {
-        for (&l, &h) in low.iter().zip(&*high) {
-            seen.look::<WATCH, false>(l, h);
-        }
-    }
-    seen.is_beyond()
-}
+/// Largest magnitude of some numbers, as its bits, which compare like magnitudes; no number's are the largest of all.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Farthest(i32);
 
-/// What is gathered of sums on their way.
-#[derive(Default)]
-pub(super) struct Seen {
-    beyond: u32,
-    pub(super) inverted: u32,
-    pub(super) widest: i32,
-}
-
-impl Seen {
-    /// Looks at the corners of a box; gives them back, if it may `TURN` inside out, in order.
+impl Farthest {
     #[inline(always)]
-    fn look<const WATCH: bool, const TURN: bool>(&mut self, l: f32, h: f32) -> (f32, f32) {
-        if WATCH {
-            // Magnitudes compare like their bits: the sign says whether one is beyond the bound.
-            self.beyond |= BOUND.wrapping_sub(l.to_bits() & MAGNITUDE);
-            self.beyond |= BOUND.wrapping_sub(h.to_bits() & MAGNITUDE);
-        }
-        if !TURN {
-            return (l, h);
-        }
-        let turned = h < l;
-        self.inverted += u32::from(turned);
-        // Positive differences compare like their bits, and above all others.
-        self.widest = self.widest.max((l - h).to_bits().cast_signed());
-        if turned { (h, l) } else { (l, h) }
+    fn of(numbers: &[f32]) -> Self {
+        let magnitudes = numbers.iter().map(|x| x.to_bits() & MAGNITUDE);
+        Self(magnitudes.fold(0, |most, own| most.max(own.cast_signed())))
     }
 
-    /// Whether a number is beyond ±[`MAX_LAB`], if that was watched.
-    const fn is_beyond(&self) -> bool {
-        self.beyond >> 31 == 1
+    fn or(self, other: Self) -> Self {
+        Self(self.0.max(other.0))
+    }
+
+    /// Whether a number is beyond ±[`MAX_LAB`].
+    #[allow(clippy::cast_possible_truncation)] // exact
+    fn is_beyond(self) -> bool {
+        self.0 > (MAX_LAB as f32).to_bits().cast_signed()
+    }
+}
+
+/// Boxes that were inside out.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Turned {
+    pub count: u32,
+    /// The largest of all differences of a lower and an upper corner that are above 0, as its bits.
+    pub widest: i32,
+}
+
+impl Turned {
+    /// Puts corners in order.
+    #[inline(always)]
+    fn back(low: &mut [f32], high: &mut [f32]) -> Self {
+        let mut turned = Self::default();
+        for (l, h) in low.iter().zip(&*high) {
+            turned.count += u32::from(h < l);
+            // Positive differences compare like their bits, and above all others.
+            turned.widest = turned.widest.max((l - h).to_bits().cast_signed());
+        }
+        if turned.count > 0 {
+            order(low, high);
+        }
+        turned
+    }
+}
+
+/// Puts corners in order without a branch: a store that hangs on a comparison is slower.
+#[inline(always)]
+fn order(low: &mut [f32], high: &mut [f32]) {
+    for (low, high) in low.iter_mut().zip(high) {
+        let exchanged = 0_u32.wrapping_sub(u32::from(*high < *low));
+        let change = (low.to_bits() ^ high.to_bits()) & exchanged;
+        *low = f32::from_bits(low.to_bits() ^ change);
+        *high = f32::from_bits(high.to_bits() ^ change);
     }
 }
 
@@ -100,21 +88,97 @@ impl Weight for [f32; BLOCK] {
     }
 }
 
-/// Both corners of a block of at most [`BLOCK`] numbers, and what [`Seen::is_beyond`] says of them.
-///
-/// A function of its own: its two outputs are known to be apart from everything else, so that the loop becomes vectors.
+/// What [`sums`] does, at the end of two lists. Two paints are summed on their way, each further one on top of them.
 #[inline(never)]
+pub(super) fn append_sums<const PAINTS: usize, const WATCH: bool>(
+    weights: [f32; PAINTS],
+    lower: [&[f32]; PAINTS],
+    upper: [&[f32]; PAINTS],
+    lists: &mut [Vec<f32>; 2],
+) -> bool {
+    let mut farthest = Farthest::default();
+    for (list, corners) in lists.iter_mut().zip([lower, upper]) {
+        let first = list.len();
+        let pairs = corners[0].iter().zip(corners[1]);
+        list.extend(pairs.map(|(own, other)| weights[0] * own + weights[1] * other));
+        let list = &mut list[first..];
+        for (weight, corners) in weights.iter().zip(corners).skip(2) {
+            for (sum, own) in list.iter_mut().zip(corners) {
+                *sum += weight * own;
+            }
+        }
+        if WATCH {
+            farthest = farthest.or(Farthest::of(list));
+        }
+    }
+    farthest.is_beyond()
+}
+
+/// Both corners of a block of at most [`BLOCK`] numbers, put in order where they may `TURN`; whether one is beyond
+/// ±[`MAX_LAB`], if that is `WATCH`ed.
 pub(super) fn sums<const PAINTS: usize, const WATCH: bool, const TURN: bool>(
     weights: &[impl Weight; PAINTS],
     lower: [&[f32]; PAINTS],
     upper: [&[f32]; PAINTS],
-    [low, high]: [&mut [f32]; 2],
+    out: [&mut [f32]; 2],
     account: &mut Account,
 ) -> bool {
+    let (farthest, turned) = pulp::Arch::new().dispatch(Sums::<_, PAINTS, WATCH, TURN> {
+        weights,
+        lower,
+        upper,
+        out,
+    });
+    if TURN {
+        account.turned(turned);
+    }
+    farthest.is_beyond()
+}
+
+/// A block with all it needs, compiled once for every processor and once for those with wide registers. Both do the same
+/// operations in the same order, so that the bits are the same.
+struct Sums<'a, W, const PAINTS: usize, const WATCH: bool, const TURN: bool> {
+    weights: &'a [W; PAINTS],
+    lower: [&'a [f32]; PAINTS],
+    upper: [&'a [f32]; PAINTS],
+    out: [&'a mut [f32]; 2],
+}
+
+impl<W: Weight, const PAINTS: usize, const WATCH: bool, const TURN: bool> pulp::NullaryFnOnce
+    for Sums<'_, W, PAINTS, WATCH, TURN>
+{
+    type Output = (Farthest, Turned);
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let [low, high] = self.out;
+        sum_block(self.weights, self.lower, self.upper, low, high);
+        let farthest = if WATCH {
+            Farthest::of(low).or(Farthest::of(high))
+        } else {
+            Farthest::default()
+        };
+        let turned = if TURN {
+            Turned::back(low, high)
+        } else {
+            Turned::default()
+        };
+        (farthest, turned)
+    }
+}
+
+/// A function of its own: its two outputs are known to be apart from everything else, so that the loop becomes vectors.
+#[inline(always)]
+fn sum_block<const PAINTS: usize>(
+    weights: &[impl Weight; PAINTS],
+    lower: [&[f32]; PAINTS],
+    upper: [&[f32]; PAINTS],
+    low: &mut [f32],
+    high: &mut [f32],
+) {
     let count = low.len().min(BLOCK);
     let (low, high) = (&mut low[..count], &mut high[..count]);
     let (lower, upper) = (lower.map(|l| &l[..count]), upper.map(|u| &u[..count]));
-    let mut seen = Seen::default();
     for k in 0..count {
         let mut l = weights[0].at(k) * lower[0][k];
         let mut h = weights[0].at(k) * upper[0][k];
@@ -122,10 +186,6 @@ pub(super) fn sums<const PAINTS: usize, const WATCH: bool, const TURN: bool>(
             l += weights[m].at(k) * lower[m][k];
             h += weights[m].at(k) * upper[m][k];
         }
-        (low[k], high[k]) = seen.look::<WATCH, TURN>(l, h);
+        (low[k], high[k]) = (l, h);
     }
-    if TURN {
-        account.turned(&seen);
-    }
-    seen.is_beyond()
 }
