@@ -13,7 +13,9 @@ use super::sparkle::{lit_from, off_by};
 use crate::color::{Lab, LinearRgb, ciede2000, luminance};
 use crate::fit::{ClusterSettings, Clusterer, SliceClusters, Thinned};
 use crate::measurement::{FlakePictures, SliceRoom};
-use crate::paint::{AngleGrid, CarPaint, ClusteringError, LightnessMixture, Percentiles, Slice};
+use crate::paint::{
+    AngleGrid, CarPaint, ClusteringError, LightnessMixture, Percentiles, Slice, slices_spread_over,
+};
 
 /// Slices compared besides those around the instrument geometries.
 const SPREAD: usize = 12;
@@ -168,12 +170,8 @@ fn slices_to_compare(pictures: &dyn FlakePictures, seen: &[Geometry]) -> Vec<usi
         let met = geometry.slices(pictures.theta_h(), pictures.theta_d());
         met.into_iter().map(|(_, k)| k)
     });
-    let (rows, columns) = (pictures.theta_h().len(), pictures.theta_d().len());
-    // A slanted lattice: no two of one row or column while there are enough of them.
-    let spread = (0..SPREAD).map(|k| {
-        let (h, d) = ((2 * k + 1) * rows / (2 * SPREAD), (5 * k + 2) % SPREAD);
-        h * columns + (2 * d + 1) * columns / (2 * SPREAD)
-    });
+    let grid = [pictures.theta_h().len(), pictures.theta_d().len()];
+    let spread = slices_spread_over(grid, SPREAD);
     let mut slices: Vec<usize> = around.chain(spread).collect();
     slices.sort_unstable();
     slices.dedup();

@@ -7,12 +7,13 @@
 use super::geometries::{Geometry, geometries};
 use super::seen::Seen;
 use crate::blend::{
-    Blend, BlendDeviation, BlendError, BlendSettings, Ingredient, RealisationWeights,
+    Blend, BlendDeviation, BlendError, BlendSettings, Ingredient, Look, RealisationWeights,
 };
 use crate::paint::{AngleGrid, CarPaint};
 use crate::transport::{Cost, Method};
 
-/// A blend at equal weights beside the blend by exact transport of the distance, at the six instrument geometries.
+/// A blend at equal weights beside the blend by exact transport of the distance, at the six instrument geometries; `joined`
+/// is the order in which its paints were joined, by place in hash order.
 ///
 /// Empty for solid colors, and for a blend that was found by exact transport of the distance.
 ///
@@ -22,6 +23,7 @@ use crate::transport::{Cost, Method};
 pub fn blend_deviation(
     ingredients: &[Ingredient<'_>],
     settings: &BlendSettings,
+    joined: &[usize],
 ) -> Result<Vec<BlendDeviation>, BlendError> {
     let exact = BlendSettings {
         method: Method::Exact,
@@ -32,23 +34,25 @@ pub fn blend_deviation(
     if *settings == exact || !with_flakes {
         return Ok(Vec::new());
     }
-    let anywhere = Some((AngleGrid::single(), AngleGrid::single()));
-    let Some(base) = even(ingredients, settings, anywhere)? else {
+    let even = |settings: &BlendSettings, angles: [AngleGrid; 2]| {
+        let look = Look { angles, joined };
+        let blend = Blend::on(ingredients, settings, Some(look), &|_| ())?;
+        let weights = RealisationWeights::equal(ingredients.len());
+        Ok(blend.realise(&weights).ok().map(|realised| realised.paint))
+    };
+    let anywhere = [AngleGrid::single(), AngleGrid::single()];
+    let Some(base) = even(settings, anywhere)? else {
         return Ok(Vec::new());
     };
     let mut deviations = Vec::new();
     for geometry in geometries(&base) {
-        let here = || {
-            let near = |angle: f64| AngleGrid::new(vec![angle.to_degrees().clamp(0.0, 90.0)]).ok();
-            Some((
-                near(geometry.half().theta_h)?,
-                near(geometry.half().theta_d)?,
-            ))
+        let near = |angle: f64| AngleGrid::new(vec![angle.to_degrees().clamp(0.0, 90.0)]).ok();
+        let half = geometry.half();
+        let (Some(theta_h), Some(theta_d)) = (near(half.theta_h), near(half.theta_d)) else {
+            continue;
         };
-        let (Some(found), Some(best)) = (
-            even(ingredients, settings, here())?,
-            even(ingredients, &exact, here())?,
-        ) else {
+        let here = [theta_h, theta_d];
+        let (Some(found), Some(best)) = (even(settings, here.clone())?, even(&exact, here)?) else {
             continue;
         };
         let noticed = seen(&geometry, &found).beside(&seen(&geometry, &best));
@@ -60,17 +64,6 @@ pub fn blend_deviation(
         });
     }
     Ok(deviations)
-}
-
-/// The paint at equal weights, on these angles.
-fn even(
-    ingredients: &[Ingredient<'_>],
-    settings: &BlendSettings,
-    angles: Option<(AngleGrid, AngleGrid)>,
-) -> Result<Option<CarPaint>, BlendError> {
-    let blend = Blend::on(ingredients, settings, angles, &|_| ())?;
-    let weights = RealisationWeights::equal(ingredients.len());
-    Ok(blend.realise(&weights).ok().map(|realised| realised.paint))
 }
 
 /// What is seen of a paint whose only slice is the one here.

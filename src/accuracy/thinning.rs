@@ -42,12 +42,11 @@ pub fn left_out_w1(flakes: &Flakes, step: usize) -> Percentiles {
     Percentiles::of(distances)
 }
 
-/// What keeping every k-th angle changes at the six instrument geometries: each is a mixture of other slices then. `None`
-/// for a solid color.
+/// What keeping no more than these of a paint's flakes changes at the six instrument geometries: each is a mixture of
+/// other slices then. `None` for a solid color.
 #[must_use]
-pub fn left_out_seen(paint: &CarPaint, step: usize) -> Option<LeftOutSeen> {
+pub fn left_out_seen(paint: &CarPaint, kept: &Flakes) -> Option<LeftOutSeen> {
     let flakes = paint.flakes.as_ref()?;
-    let kept = flakes.thinned(step);
     let at = |geometry: &Geometry, flakes: &Flakes| {
         let met = geometry.slices(&flakes.theta_h, &flakes.theta_d);
         let parts: Vec<_> = met
@@ -58,7 +57,7 @@ pub fn left_out_seen(paint: &CarPaint, step: usize) -> Option<LeftOutSeen> {
     };
     let noticed: Vec<Noticed> = geometries(paint)
         .iter()
-        .map(|geometry| at(geometry, &kept).beside(&at(geometry, flakes)))
+        .map(|geometry| at(geometry, kept).beside(&at(geometry, flakes)))
         .collect();
     let of = |get: fn(&Noticed) -> f64| -> Option<[f64; 6]> {
         let all: Vec<f64> = noticed.iter().map(get).collect();
@@ -120,18 +119,18 @@ mod tests {
             color_table: ColorTable::white(),
             flakes: Some(flakes(lightness)),
         };
-        let seen = left_out_seen(&paint([30.0; 5]), 2).expect("flakes");
-        assert!(
-            seen.delta_e_2000.into_iter().all(|off| off < 1e-9),
-            "{seen:?}"
-        );
-        assert!(seen.lit.into_iter().all(|off| off < 1e-9), "{seen:?}");
-        // The slice at 5 degrees is as dark as its neighbours no more.
-        let seen = left_out_seen(&paint([30.0, 80.0, 30.0, 30.0, 30.0]), 2).expect("flakes");
-        assert!(seen.delta_e_2000[0] > 5.0, "{seen:?}");
-        assert!(seen.sparkle[0] > 0.3, "{seen:?}");
-        for at in 3..6 {
-            assert!(seen.delta_e_2000[at] < 1e-9, "{seen:?}");
+        let seen = |lightness| {
+            let paint = paint(lightness);
+            let kept = paint.flakes.as_ref().expect("flakes").thinned(2);
+            let seen = left_out_seen(&paint, &kept).expect("flakes");
+            [seen.delta_e_2000, seen.sparkle, seen.lit]
+        };
+        assert_eq!(seen([30.0; 5]), [[0.0; 6]; 3]);
+        // The light slice at 5 degrees is left out.
+        let [color, sparkle, lit] = seen([30.0, 80.0, 30.0, 30.0, 30.0]);
+        assert!(color[0] > 5.0 && sparkle[0] > 0.3, "{color:?} {sparkle:?}");
+        for at in 2..6 {
+            assert_eq!([color[at], sparkle[at], lit[at]], [0.0; 3], "{at}");
         }
     }
 }

@@ -2,9 +2,9 @@
 //!
 //! Two paints are transported onto each other; of their blend the realisation at equal weights is transported onto the
 //! third, and so on (Golla and Klein 2018, 4.3), in the order of content hashes or in the cheapest of all orders, told by
-//! all slices or by a few ([`Order`]). Every entry of a plan becomes a cluster with one probability and one box per paint. Clusters are kept in
-//! the order of their lightness at equal weights: that order never depends on the weights of a realisation, so nothing
-//! flickers when they change.
+//! all slices or by a few ([`Order`]). Every entry of a plan becomes a cluster with one probability and one box per paint.
+//! Clusters are kept in the order of their lightness at equal weights: that order never depends on the weights of a
+//! realisation, so nothing flickers when they change.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,7 @@ pub struct BlendSettings {
     /// Cost of moving between two cluster centers in Lab.
     pub cost: Cost,
     /// Order in which more than two paints are joined.
-    #[serde(default)]
+    #[serde(default = "of_older_files")]
     pub order: Order,
 }
 
@@ -40,6 +40,11 @@ impl Default for BlendSettings {
             order: Order::Sampled,
         }
     }
+}
+
+/// Blends from before there was a choice.
+fn of_older_files() -> Order {
+    Order::Canonical
 }
 
 /// One slice's corresponding clusters: probabilities, and boxes paint by paint.
@@ -92,11 +97,21 @@ impl Grid<'_> {
     }
 }
 
-/// Corresponding clusters of paints in the order given, and how good they are; on their common angles, or on others.
+/// A look at other angles than the paints' common ones.
+#[derive(Clone, Debug)]
+pub struct Look<'a> {
+    /// The angles, θh and θd.
+    pub angles: [AngleGrid; 2],
+    /// The order in which the paints were joined, by place in hash order.
+    pub joined: &'a [usize],
+}
+
+/// Corresponding clusters of paints in the order given, and how good they are; on their common angles, or as another look
+/// has it.
 pub(super) fn correspond(
     paints: &[&CarPaint],
     settings: &BlendSettings,
-    on: Option<(AngleGrid, AngleGrid)>,
+    look: Option<Look<'_>>,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<(Option<BlendedFlakes>, CorrespondenceReport), BlendError> {
     let grids = paints
@@ -106,20 +121,28 @@ pub(super) fn correspond(
     let Some(common) = common_grid(grids)? else {
         return Ok((None, CorrespondenceReport::default()));
     };
-    let (theta_h, theta_d) = on.unwrap_or(common);
+    let (theta_h, theta_d, tried) = match look {
+        Some(Look {
+            angles: [theta_h, theta_d],
+            joined,
+        }) => (theta_h, theta_d, vec![joined.to_vec()]),
+        None => (common.0, common.1, orders(paints.len(), settings.order)),
+    };
     let grid = Grid {
         theta_h: &theta_h,
         theta_d: &theta_d,
     };
     let count = grid.slices();
-    let tried = orders(paints.len(), settings.order);
-    let telling = settings.order.telling(count, tried.len());
-    let done = AtomicUsize::new(0);
-    let all = if tried.len() > 1 && telling.len() < count {
-        telling.len() * tried.len() + count
-    } else {
-        count * tried.len()
+    let whole: Vec<usize> = (0..count).collect();
+    let telling = match tried.len() {
+        1 => Vec::new(),
+        several => (settings.order).telling([theta_h.len(), theta_d.len()], several),
     };
+    let all = match telling.len() {
+        few if few < count => few * tried.len() + count,
+        _ => count * tried.len(),
+    };
+    let done = AtomicUsize::new(0);
     let tell = || {
         let so_far = done.fetch_add(1, Ordering::Relaxed) + 1;
         if so_far.is_multiple_of(64) || so_far == all {
@@ -128,7 +151,6 @@ pub(super) fn correspond(
         }
     };
     let join = |order: &[usize], on: &[usize]| join(paints, order, (grid, on), settings, &tell);
-    let whole: Vec<usize> = (0..count).collect();
     let (order, slices) = match tried.as_slice() {
         [only] => (only.clone(), join(only, &whole)?),
         several => {

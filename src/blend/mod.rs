@@ -28,10 +28,10 @@ mod thinned;
 mod weights;
 
 pub use clamp::Clamp;
-pub use correspondence::BlendSettings;
+pub use correspondence::{BlendSettings, Look};
 pub use file::BlendFileError;
 pub use order::Order;
-pub use origin::{Origin, Reduction};
+pub use origin::{Origin, Reduction, Thinning};
 pub use pairs::PairReport;
 pub(crate) use parts::Part;
 pub use realise::Realised;
@@ -170,7 +170,7 @@ impl Blend {
         Self::on(ingredients, settings, None, progress)
     }
 
-    /// The same on these angles alone, in place of the paints' common ones: for a look at a few slices.
+    /// The same on other angles than the paints' common ones, joined as they were.
     ///
     /// # Errors
     ///
@@ -178,7 +178,7 @@ impl Blend {
     pub fn on(
         ingredients: &[Ingredient<'_>],
         settings: &BlendSettings,
-        angles: Option<(AngleGrid, AngleGrid)>,
+        look: Option<Look<'_>>,
         progress: &(dyn Fn(f32) + Sync),
     ) -> Result<Self, BlendError> {
         if !PAINTS.contains(&ingredients.len()) {
@@ -200,7 +200,7 @@ impl Blend {
             .iter()
             .map(|&k| ingredients[first(k).map_or(k, |&j| j)].paint)
             .collect();
-        let (flakes, report) = correspond(&ordered, settings, angles, progress)?;
+        let (flakes, report) = correspond(&ordered, settings, look, progress)?;
         let (chi_h, chi_d) = base::common_table_grid(&ordered)?;
         let paints = canonical
             .iter()

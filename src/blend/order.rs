@@ -14,12 +14,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::paint::slices_spread_over;
+
 /// Order in which paints are joined.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
     /// That of the content hashes.
-    #[default]
     Canonical,
     /// The cheapest of all, as a few slices tell.
     Sampled,
@@ -35,23 +36,26 @@ const FEWEST: usize = 4;
 const MOST: usize = 24;
 
 impl Order {
-    /// The slices, of so many, that tell which of the orders is the cheapest.
-    pub(super) fn telling(self, slices: usize, orders: usize) -> Vec<usize> {
+    /// The same of so many paints: of two there is but one order.
+    #[must_use]
+    pub const fn among(self, paints: usize) -> Self {
+        if paints < 3 { Self::Canonical } else { self }
+    }
+
+    /// The slices of a grid that tell which of several orders is the cheapest.
+    pub(super) fn telling(self, grid: [usize; 2], orders: usize) -> Vec<usize> {
         let tried = match self {
-            Self::Sampled => (TRIES / orders.max(1)).clamp(FEWEST, MOST).min(slices),
-            Self::Canonical | Self::Cheapest => slices,
+            Self::Sampled => (TRIES / orders).clamp(FEWEST, MOST),
+            Self::Canonical | Self::Cheapest => usize::MAX,
         };
-        // The middles of as many equal parts.
-        (0..tried)
-            .map(|k| (2 * k + 1) * slices / (2 * tried))
-            .collect()
+        slices_spread_over(grid, tried)
     }
 }
 
 /// The orders to try, the canonical one first. Exchanging the first two paints changes no cost: one of the two is tried.
 pub(super) fn orders(paints: usize, order: Order) -> Vec<Vec<usize>> {
     let canonical: Vec<usize> = (0..paints).collect();
-    if order == Order::Canonical || paints < 3 {
+    if order.among(paints) == Order::Canonical {
         return vec![canonical];
     }
     let mut all = vec![Vec::new()];
@@ -75,15 +79,11 @@ mod tests {
 
     #[test]
     fn few_slices_tell_of_many_orders_and_all_of_the_cheapest() {
-        for (orders, slices) in [(1, 24), (3, 24), (12, 8), (60, 4)] {
-            let telling = Order::Sampled.telling(576, orders);
-            assert_eq!(telling.len(), slices);
-            let gaps = telling.windows(2).map(|pair| pair[1] - pair[0]);
-            assert!(gaps.clone().all(|gap| gap.abs_diff(576 / slices) <= 1));
-            assert!(telling[slices - 1] < 576);
+        for (orders, slices) in [(3, 24), (12, 8), (60, 4)] {
+            assert_eq!(Order::Sampled.telling([24, 24], orders).len(), slices);
         }
-        assert_eq!(Order::Sampled.telling(3, 3), [0, 1, 2]);
-        assert!(Order::Cheapest.telling(50, 60).into_iter().eq(0..50));
+        assert_eq!(Order::Sampled.telling([3, 1], 3), [0, 1, 2]);
+        assert!(Order::Cheapest.telling([10, 5], 60).into_iter().eq(0..50));
     }
 
     #[test]

@@ -13,6 +13,17 @@ pub struct Reduction {
     pub to: usize,
 }
 
+/// Angles of a paint that were left out before it was blended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Thinning {
+    /// Every so many-th angle was kept, on either grid.
+    pub step: usize,
+    /// Slices before.
+    pub from: usize,
+    /// Slices after.
+    pub to: usize,
+}
+
 /// Where one paint of a blend comes from, and what was known of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
@@ -22,6 +33,9 @@ pub struct Origin {
     /// How its clusters were reduced, where they were.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reduced: Option<Reduction>,
+    /// How its angles were thinned, where they were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thinned: Option<Thinning>,
     /// How well its base was fitted, where it was fitted to a table.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residuals: Option<FitResiduals>,

@@ -224,6 +224,47 @@ fn the_cheapest_order_is_never_dearer_than_the_canonical_one_and_once_cheaper() 
 }
 
 #[test]
+fn a_few_slices_tell_the_order_in_which_all_are_joined() {
+    let axis: Vec<f64> = (0..7).map(|k| 10.0 * f64::from(k)).collect();
+    let paints: Vec<CarPaint> = (0..3).map(|seed| paint(seed, &axis, &axis)).collect();
+    let ingredients: Vec<Ingredient<'_>> = paints
+        .iter()
+        .map(|paint| Ingredient { name: "p", paint })
+        .collect();
+    let settings = BlendSettings::default();
+    assert_eq!(settings.order, Order::Sampled);
+    let on_threads = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let shares = std::sync::Mutex::new(Vec::new());
+        let tell = |share: f32| shares.lock().expect("whole").push(share);
+        let blend = pool
+            .expect("threads")
+            .install(|| Blend::new(&ingredients, &settings, &tell));
+        let mut shares = shares.into_inner().expect("whole");
+        shares.sort_by(f32::total_cmp);
+        (blend.expect("blends"), shares)
+    };
+    let (blend, shares) = on_threads(1);
+    // 24 slices in three orders and all 49 in one are told of at every 64th and at the end.
+    assert_eq!(shares, [64.0 / 121.0, 1.0]);
+    let bytes = blend.to_bytes().expect("finite");
+    assert!(bytes == on_threads(8).0.to_bytes().expect("finite"));
+    let grid = || AngleGrid::new(axis.clone()).expect("ascends");
+    let look = |joined: &[usize]| {
+        let look = Look {
+            angles: [grid(), grid()],
+            joined,
+        };
+        let blend = Blend::on(&ingredients, &settings, Some(look), &|_| ());
+        blend.expect("blends").to_bytes().expect("finite")
+    };
+    let told = &blend.report().order;
+    for order in super::order::orders(3, Order::Cheapest) {
+        assert_eq!(look(&order) == bytes, order == *told, "{order:?} {told:?}");
+    }
+}
+
+#[test]
 fn every_pair_says_how_far_it_is_from_the_best_of_its_own() {
     let paints: Vec<CarPaint> = (1..4)
         .map(|seed| paint(seed, &[0.0, 30.0], &[0.0, 20.0]))

@@ -51,8 +51,8 @@ impl Bundle {
         if picked.is_some() {
             stages.end("search");
         }
-        let mut made = bundle_blend(&blend, &options.profile)?;
-        stages.end_with(std::mem::take(&mut made.stages));
+        let made = bundle_blend(&blend, &options.profile)?;
+        stages.end_with(&made.stages);
         output::replace(&self.out, &made.bytes)?;
         stages.end("write");
         made::write_seconds(self.timings.as_deref(), stages)?;

@@ -221,7 +221,7 @@ impl Preview {
             stages.end("search");
         }
         let progress = Progress::new("drawing");
-        let mut made = preview(
+        let made = preview(
             &thing,
             weights.as_ref(),
             &wanted,
@@ -229,7 +229,7 @@ impl Preview {
             &options.limits,
             &|share| progress.at(share),
         )?;
-        stages.end_with(std::mem::take(&mut made.stages));
+        stages.end_with(&made.stages);
         output::replace(&self.out, &made.bytes)?;
         drop(progress);
         stages.end("write");

@@ -54,8 +54,8 @@ impl Realise {
         if picked.is_some() {
             stages.end("search");
         }
-        let mut made = realise(&thing, weights.as_ref(), format, &options.profile)?;
-        stages.end_with(std::mem::take(&mut made.stages));
+        let made = realise(&thing, weights.as_ref(), format, &options.profile)?;
+        stages.end_with(&made.stages);
         output::replace(&self.out, &made.bytes)?;
         stages.end("write");
         made::write_seconds(self.timings.as_deref(), stages)?;

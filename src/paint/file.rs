@@ -76,6 +76,15 @@ pub struct Clustering {
 }
 
 impl Clustering {
+    /// The box rule of a paint whose clusters came of a blend.
+    pub const BLENDED: &str = "blended";
+
+    /// Whether the clusters came of a blend: no profile makes them.
+    #[must_use]
+    pub fn is_of_blend(&self) -> bool {
+        self.box_rule == Self::BLENDED
+    }
+
     fn check(&self, limits: &Limits) -> Result<(), PaintFileError> {
         let refuse = |field, value: &dyn std::fmt::Display, accepted| {
             Err(PaintFileError::Clustering {
@@ -87,11 +96,19 @@ impl Clustering {
         if !(1..=limits.clusters).contains(&self.clusters) {
             return refuse("clusters", &self.clusters, "1 to the limit");
         }
-        if !["tight", "moments", "blended"].contains(&self.box_rule.as_str()) {
+        if !["tight", "moments", Self::BLENDED].contains(&self.box_rule.as_str()) {
             return refuse("box_rule", &self.box_rule, "tight, moments or blended");
         }
         if !(1..=90).contains(&self.angle_step) {
             return refuse("angle_step", &self.angle_step, "1 to 90");
+        }
+        let seen = self.left_out_seen.iter();
+        if let Some(off) = seen
+            .flat_map(|seen| [seen.delta_e_2000, seen.sparkle, seen.lit])
+            .flatten()
+            .find(|off| !(*off >= 0.0 && off.is_finite()))
+        {
+            return refuse("left_out_seen", &off, "0 or more");
         }
         if let Some(lab) = self
             .realised_lab

@@ -32,7 +32,7 @@ mod shared_list;
 mod sparkle;
 mod validate;
 
-pub use angle::{AngleGrid, AngleGridError, Bracket, LEAST_STEP_DEG};
+pub use angle::{AngleGrid, AngleGridError, Bracket, LEAST_STEP_DEG, slices_spread_over};
 pub(crate) use angle::{QuickBracket, QuickGrid};
 pub use box_color::{center_of_mean, mean_color};
 pub use cells::{RandomTexture, cell_spacing};

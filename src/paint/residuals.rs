@@ -92,7 +92,8 @@ pub struct ClusteringError {
     pub lit: Option<[f64; 6]>,
 }
 
-/// What leaving out angles changes at the six instrument geometries.
+/// What leaving out angles changes at the six instrument geometries, in the order of
+/// [`ASPECULAR_DEG`](super::ASPECULAR_DEG). Relative differences are 0 or more, 1 is all.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LeftOutSeen {

@@ -3,9 +3,9 @@
 use super::WorkshopError;
 use super::describing::blend_notes;
 use crate::accuracy::{Profile, blend_deviation, left_out_seen, left_out_w1};
-use crate::blend::{Blend, BlendError, Ingredient, Origin, Reduction};
+use crate::blend::{Blend, BlendError, Ingredient, Origin, Reduction, Thinning};
 use crate::fit::{ClusterSettings, reduce_clusters};
-use crate::paint::{CarPaint, Clamp, Clustering, Flakes, PaintFile};
+use crate::paint::{CarPaint, Clamp, Clustering, PaintFile};
 use crate::transport::TransportError;
 
 /// A new blend and what was done on the way.
@@ -27,16 +27,16 @@ pub fn blend_paints(
     profile: &Profile,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Blended, WorkshopError> {
-    let reduced: Vec<Option<CarPaint>> = paints
+    let ready: Vec<Ready> = paints
         .iter()
-        .map(|file| reduced(file, &profile.flakes))
+        .map(|file| Ready::of(file, &profile.flakes))
         .collect();
     let ingredients: Vec<Ingredient<'_>> = paints
         .iter()
-        .zip(&reduced)
-        .map(|(file, reduced)| Ingredient {
+        .zip(&ready)
+        .map(|(file, ready)| Ingredient {
             name: &file.name,
-            paint: reduced.as_ref().unwrap_or(&file.paint),
+            paint: ready.paint.as_ref().unwrap_or(&file.paint),
         })
         .collect();
     let blend =
@@ -53,25 +53,19 @@ pub fn blend_paints(
             ),
             _ => WorkshopError::internal(error),
         })?;
-    let origins = paints.iter().zip(&reduced).map(|(file, reduced)| Origin {
+    let origins = paints.iter().zip(&ready).map(|(file, ready)| Origin {
         simulated_flakes: file.provenance.simulated_flakes,
         residuals: file.residuals.clone(),
         energy: Some(file.energy.clone()),
         clamps: clamps_of(file).to_vec(),
         warnings: file.warnings.clone(),
-        reduced: (reduced.as_ref())
-            .map(|fewer| Reduction {
-                from: widest(&file.paint),
-                to: widest(fewer),
-            })
-            .filter(|by| by.to < by.from),
+        reduced: ready.reduced,
+        thinned: ready.thinned,
     });
+    let joined = &blend.report().order;
     let deviation =
-        blend_deviation(&ingredients, &profile.blend).map_err(WorkshopError::internal)?;
-    let clusterings: Vec<_> = paints
-        .iter()
-        .map(|file| clustering_of(file, &profile.flakes))
-        .collect();
+        blend_deviation(&ingredients, &profile.blend, joined).map_err(WorkshopError::internal)?;
+    let clusterings: Vec<_> = ready.iter().map(|ready| ready.clustering.clone()).collect();
     let blend = blend
         .with_origins(origins)
         .with_accuracy(deviation, &clusterings);
@@ -84,55 +78,61 @@ fn clamps_of(file: &PaintFile) -> &[Clamp] {
     realisation.map_or(&[], |of| &of.clamps)
 }
 
-fn widest(paint: &CarPaint) -> usize {
-    paint.flakes.as_ref().map_or(0, Flakes::widest_slice)
-}
-
-/// How a paint's flakes were clustered, and what leaving out angles now costs.
-fn clustering_of(file: &PaintFile, wanted: &ClusterSettings) -> Option<Clustering> {
-    let clustering = file.clustering.clone()?;
-    let flakes = file.paint.flakes.as_ref()?;
-    // What taking several clusters for one misplaces is not measured.
-    let realised_lab = clustering
-        .realised_lab
-        .filter(|_| !wants_fewer(file, flakes, wanted));
-    let step = angle_step(file, wanted);
-    Some(Clustering {
-        angle_step: clustering.angle_step * step,
-        left_out_w1: (step > 1)
-            .then(|| left_out_w1(flakes, step))
-            .or(clustering.left_out_w1),
-        left_out_seen: if step > 1 {
-            left_out_seen(&file.paint, step)
-        } else {
-            clustering.left_out_seen
-        },
-        realised_lab,
-        ..clustering
-    })
-}
-
 /// Every how many-th of a paint's own angles is used.
 fn angle_step(file: &PaintFile, wanted: &ClusterSettings) -> usize {
     let had = file.clustering.as_ref().map_or(1, |c| c.angle_step);
     (wanted.angle_step / had).max(1)
 }
 
-/// Whether a paint came from a blend, with more clusters than the profile has.
-fn wants_fewer(file: &PaintFile, flakes: &Flakes, wanted: &ClusterSettings) -> bool {
-    file.provenance.is_blend() && flakes.widest_slice() > wanted.clusters
+/// What is to be blended of a paint.
+#[derive(Default)]
+struct Ready {
+    /// The paint as the profile wants it, where it is not as it was: with fewer angles if it was fitted at more, and, if it
+    /// came from a blend and has more clusters, with fewer of those.
+    paint: Option<CarPaint>,
+    thinned: Option<Thinning>,
+    reduced: Option<Reduction>,
+    /// How its flakes were clustered, and what leaving out angles now costs.
+    clustering: Option<Clustering>,
 }
 
-/// The paint as the profile wants it: with fewer angles if it was fitted at more, and, if it came from a blend and has
-/// more clusters, with fewer of those.
-fn reduced(file: &PaintFile, wanted: &ClusterSettings) -> Option<CarPaint> {
-    let flakes = file.paint.flakes.as_ref()?;
-    let step = angle_step(file, wanted);
-    let thinned = (step > 1).then(|| flakes.thinned(step));
-    let flakes = thinned.as_ref().unwrap_or(flakes);
-    let fewer = wants_fewer(file, flakes, wanted).then(|| reduce_clusters(flakes, wanted.clusters));
-    fewer.or(thinned).map(|flakes| CarPaint {
-        flakes: Some(flakes),
-        ..file.paint.clone()
-    })
+impl Ready {
+    fn of(file: &PaintFile, wanted: &ClusterSettings) -> Self {
+        let Some(flakes) = &file.paint.flakes else {
+            return Self::default();
+        };
+        let step = angle_step(file, wanted);
+        let thinned = (step > 1).then(|| flakes.thinned(step));
+        let kept = thinned.as_ref().unwrap_or(flakes);
+        let fewer = (file.provenance.is_blend() && kept.widest_slice() > wanted.clusters)
+            .then(|| reduce_clusters(kept, wanted.clusters));
+        let mut clustering = file.clustering.clone();
+        if let Some(clustering) = &mut clustering {
+            clustering.angle_step *= step;
+            if let Some(kept) = &thinned {
+                clustering.left_out_w1 = Some(left_out_w1(flakes, step));
+                clustering.left_out_seen = left_out_seen(&file.paint, kept);
+            }
+            if fewer.is_some() {
+                // What taking several clusters for one misplaces is not measured.
+                clustering.realised_lab = None;
+            }
+        }
+        Self {
+            thinned: thinned.as_ref().map(|kept| Thinning {
+                step,
+                from: flakes.slices(),
+                to: kept.slices(),
+            }),
+            reduced: fewer.as_ref().map(|fewer| Reduction {
+                from: kept.widest_slice(),
+                to: fewer.widest_slice(),
+            }),
+            paint: fewer.or(thinned).map(|flakes| CarPaint {
+                flakes: Some(flakes),
+                ..file.paint.clone()
+            }),
+            clustering,
+        }
+    }
 }

@@ -71,10 +71,8 @@ pub(super) fn describe_correspondence(blend: &Blend) -> Value {
     correspondence["without_flakes"] = told(&report.without_flakes).into();
     correspondence["reduced"] = reduced.into();
     // Weights follow the order asked for; the paints are joined in this one.
-    correspondence["order"] = match blend.settings().order {
-        // Of two there is but one.
+    correspondence["order"] = match blend.settings().order.among(blend.len()) {
         Order::Canonical => "content hash".into(),
-        _ if report.order.len() < 3 => "content hash".into(),
         Order::Sampled => "cheapest on a few slices".into(),
         Order::Cheapest => "cheapest".into(),
     };
@@ -95,8 +93,7 @@ pub fn blend_notes(blend: &Blend, profile: &Profile) -> Vec<String> {
     for (((name, _), clustering), origin) in of_each.zip(blend.origins()) {
         let rule = wanted.box_rule.name();
         if let Some(had) = clustering
-            && had.realised_lab.is_none()
-            && had.box_rule != "blended"
+            && !had.is_of_blend()
             && (had.clusters != wanted.clusters || had.box_rule != rule)
         {
             notes.push(format!(
@@ -105,12 +102,10 @@ pub fn blend_notes(blend: &Blend, profile: &Profile) -> Vec<String> {
                 had.clusters, had.box_rule, wanted.clusters
             ));
         }
-        if let Some(had) = clustering
-            && had.left_out_w1.is_some()
-        {
+        if let Some(by) = &origin.thinned {
             notes.push(format!(
-                "{name}: one flake angle in {} on either grid was used",
-                had.angle_step
+                "{name}: {} of {} flake slices were used, one angle in {} on either grid",
+                by.to, by.from, by.step
             ));
         }
         if let Some(by) = &origin.reduced {

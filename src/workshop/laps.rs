@@ -30,13 +30,13 @@ impl Laps {
     }
 
     /// The stages of some work are over, and what came between them and now is the last one's.
-    pub fn end_with(&mut self, stages: Vec<Lap>) {
+    pub fn end_with(&mut self, stages: &[Lap]) {
         let now = Instant::now();
         let mut rest = now - self.since;
-        for (_, time) in &stages {
+        for (_, time) in stages {
             rest = rest.saturating_sub(*time);
         }
-        self.ended.extend(stages);
+        self.ended.extend_from_slice(stages);
         if let Some((_, last)) = self.ended.last_mut() {
             *last += rest;
         }
@@ -64,7 +64,7 @@ mod tests {
         work.end("draw");
         work.end("encode");
         std::thread::sleep(Duration::from_millis(2));
-        laps.end_with(work.into_stages());
+        laps.end_with(&work.into_stages());
         let whole = begun.elapsed();
         let stages = laps.into_stages();
         let names: Vec<&str> = stages.iter().map(|(name, _)| *name).collect();

@@ -228,6 +228,7 @@ pub fn realise(
         Format::Json => export::material_json(&chosen.paint, &about, &profile.export)?,
         Format::Paint => {
             let file = paint_file(&chosen, &error);
+            laps.end("certificate");
             chosen.notes.extend(file.warnings.iter().cloned());
             file.to_bytes()?
         }
@@ -268,7 +269,7 @@ pub(super) fn error_of(thing: &Thing, weights: Option<&RealisationWeights>) -> R
 fn paint_file(chosen: &Chosen, error: &ResultError) -> PaintFile {
     let clustering = chosen.paint.flakes.as_ref().map(|f| Clustering {
         clusters: f.widest_slice(),
-        box_rule: "blended".to_owned(),
+        box_rule: Clustering::BLENDED.to_owned(),
         angle_step: 1,
         w1_bound: None,
         left_out_w1: None,

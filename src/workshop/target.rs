@@ -116,6 +116,12 @@ impl Target {
             .is_none_or(|most| searched + estimate.seconds <= most)
     }
 
+    /// Whether what is known of an error already is too much.
+    fn is_too_far(&self, estimate: &Estimate) -> bool {
+        let (known, most) = (estimate.error.at_least, self.max_error);
+        known.zip(most).is_some_and(|(known, most)| known > most)
+    }
+
     fn is_met(&self, estimate: &Estimate, searched: f64) -> bool {
         self.is_in_time(estimate, searched)
             && self
@@ -148,15 +154,22 @@ impl Target {
         if let Work::Preview(picture) = work {
             return samples::pick_samples(self, picture, &search);
         }
-        let estimates = match self.max_error {
+        let mut estimates = match self.max_error {
             Some(_) => self.accurate_enough(work, &search)?,
             None => self.fast_enough(work, &search)?,
         };
-        let (tried, searched) = (estimates.len(), search.seconds());
-        let estimate = self
-            .best(estimates, searched)
-            .ok_or_else(|| WorkshopError::internal("there is no profile to pick from"))?;
-        Ok(self.picked(estimate, tried, searched))
+        loop {
+            let searched = search.seconds();
+            let best = self
+                .best(&estimates, searched)
+                .ok_or_else(|| WorkshopError::internal("there is no profile to pick from"))?;
+            let rough = |e: &&mut Estimate| e.knobs == best.knobs && e.error.at_least.is_some();
+            match estimates.iter_mut().find(rough) {
+                // What is told of the best that could be done is measured too.
+                Some(rough) if self.max_error.is_some() => measure_error(work, rough)?,
+                _ => return Ok(self.picked(best, estimates.len(), searched)),
+            }
+        }
     }
 
     /// Estimates from cheap to dear: what comes after one that is accurate enough, or too slow, is not looked at.
@@ -169,9 +182,8 @@ impl Target {
         for profile in ladder(work) {
             let mut estimate = work.estimate(&profile)?;
             let too_slow = !self.is_in_time(&estimate, search.seconds());
-            let too_far = (self.max_error).is_some_and(|most| estimate.error.at_least > most);
-            if !too_slow && !too_far {
-                measure_error(work, &profile, &mut estimate)?;
+            if !too_slow && !self.is_too_far(&estimate) {
+                measure_error(work, &mut estimate)?;
             }
             let enough = self.is_met(&estimate, search.seconds());
             estimates.push(estimate);
@@ -231,7 +243,7 @@ impl Target {
 
     /// Of estimates from cheap to dear: with a largest error the cheapest that meets all, with a longest time alone the
     /// most accurate; where none does, the most accurate in time, and where none is in time, the fastest.
-    fn best(&self, estimates: Vec<Estimate>, searched: f64) -> Option<Estimate> {
+    fn best(&self, estimates: &[Estimate], searched: f64) -> Option<Estimate> {
         let error_of = |e: &Estimate| e.error.value.unwrap_or(f64::INFINITY);
         // Of equals the first, which is the cheapest whatever the clock says.
         let finer = |x: &Estimate, y: &Estimate| error_of(x).total_cmp(&error_of(y));
@@ -241,7 +253,7 @@ impl Target {
             .collect();
         if in_time.is_empty() {
             let faster = |x: &Estimate, y: &Estimate| x.seconds.total_cmp(&y.seconds);
-            return estimates.into_iter().min_by(faster);
+            return estimates.iter().cloned().min_by(faster);
         }
         let cheapest = in_time.iter().find(|e| self.is_met(e, searched)).cloned();
         match (cheapest, self.max_error) {
@@ -252,14 +264,12 @@ impl Target {
 }
 
 /// Replaces an error that was estimated on some slices by the one of all.
-fn measure_error(
-    work: &Work<'_>,
-    profile: &Profile,
-    estimate: &mut Estimate,
-) -> Result<(), WorkshopError> {
+fn measure_error(work: &Work<'_>, estimate: &mut Estimate) -> Result<(), WorkshopError> {
+    let profile = estimate.knobs;
+    estimate.error.at_least = None;
     match *work {
         Work::Blend { paints } => {
-            let blend = blend_paints(paints, profile, &|_| ())?.blend;
+            let blend = blend_paints(paints, &profile, &|_| ())?.blend;
             estimate.error.value = blend_error(&blend).lab;
         }
         Work::Realise {
@@ -281,12 +291,12 @@ fn measure_error(
         }
         Work::BlendNames { names, options } => {
             let options = IngestOptions {
-                profile: *profile,
+                profile,
                 ..options.clone()
             };
             let paints = open_paints(names, &options, &|_| ())?;
             let paints: Vec<&PaintFile> = paints.iter().collect();
-            measure_error(&Work::Blend { paints: &paints }, profile, estimate)?;
+            measure_error(&Work::Blend { paints: &paints }, estimate)?;
         }
         // Ingest and preview are compared on the very slices and pixels that the result is compared on.
         Work::Ingest { .. } | Work::Preview(_) => {}
@@ -312,7 +322,7 @@ mod tests {
             error: EstimatedError {
                 value: Some(error),
                 unit: "Lab",
-                at_least: 0.0,
+                at_least: None,
             },
         }
     }
@@ -332,7 +342,7 @@ mod tests {
                 max_error,
                 max_seconds,
             };
-            let best = target.best(ladder(), searched).expect("one of four");
+            let best = target.best(&ladder(), searched).expect("one of four");
             (best.seconds, target.is_met(&best, searched))
         };
         let best = |max_error, max_seconds| after(0.0, max_error, max_seconds);
@@ -345,6 +355,19 @@ mod tests {
         // The search is part of what is waited for.
         assert_eq!(after(1.0, None, Some(3.5)), (2.0, true));
         assert_eq!(after(3.0, None, Some(3.5)), (1.0, false));
+    }
+
+    #[test]
+    fn only_what_is_known_to_be_too_much_is_not_measured() {
+        let target = Target {
+            max_error: Some(0.5),
+            max_seconds: None,
+        };
+        for (at_least, too_far) in [(None, false), (Some(0.5), false), (Some(0.51), true)] {
+            let mut rough = estimate(1.0, 0.9);
+            rough.error.at_least = at_least;
+            assert_eq!(target.is_too_far(&rough), too_far, "{at_least:?}");
+        }
     }
 
     #[test]

@@ -32,6 +32,7 @@ fn a_bundle_meets_a_target_and_tells_its_seconds_and_its_error() {
     let words = "bundle b.blend --max-error 1000 --timings t.json --json --out b.zip";
     let said = json(&desk.ok(&words.split(' ').collect::<Vec<_>>()).stdout);
     assert_eq!(said["picked"]["met"], true, "{said}");
+    assert_eq!(said["picked"]["estimate"]["knobs"]["precision"], "8bit");
     let finer = json(
         &desk
             .ok(&[

@@ -166,20 +166,3 @@ fn an_estimate_knows_the_bytes_of_every_picture() {
     let refused = desk.refused(2, &aside.split(' ').collect::<Vec<_>>());
     assert!(refused.contains("--spp"), "{refused}");
 }
-
-/// Both draw as many samples in all; of so few pixels nothing but their number tells drawing from getting ready.
-#[test]
-fn a_tiny_picture_of_many_samples_is_not_taken_for_a_large_one() {
-    let desk = Desk::new();
-    let estimate = |size, samples| {
-        let asked = ["estimate", "preview", "sample:white", "--json"];
-        let told = json(
-            &desk
-                .ok(&[&asked[..], &["--size", size, "--spp", samples]].concat())
-                .stdout,
-        );
-        told["seconds"].as_f64().expect("seconds")
-    };
-    let (tiny, small) = (estimate("8x8", "4096"), estimate("64x64", "64"));
-    assert!((0.05..20.0).contains(&(tiny / small)), "{tiny} {small}");
-}

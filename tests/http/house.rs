@@ -191,7 +191,7 @@ impl Works for Pretend {
             error: EstimatedError {
                 value: Some(0.25),
                 unit: "Lab",
-                at_least: 0.0,
+                at_least: None,
             },
         })
     }

@@ -22,7 +22,13 @@ async fn pages_of_a_named_address_may_ask_and_make_and_no_others() {
     assert_eq!((list.status, list.header(allowed)), (200, Some(SHOP)));
     assert!(list.header("x-request-id").is_some());
     let readable = list.header("access-control-expose-headers").expect("some");
-    for header in ["etag", "location", "carpaint-accuracy", "x-request-id"] {
+    for header in [
+        "etag",
+        "location",
+        "carpaint-accuracy",
+        "carpaint-study",
+        "x-request-id",
+    ] {
         assert!(readable.contains(header), "{readable}");
     }
     let refusal = house.ask("GET", "/v1/paints/no", &from(SHOP), b"").await;

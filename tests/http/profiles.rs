@@ -126,6 +126,7 @@ async fn profiles_are_names_or_knobs_and_targets_are_answered_with_what_was_pick
         write(none);
         let served = house.get("/v1/accuracy").await;
         assert_eq!(served.json(), shipped.json(), "{none} is no study");
+        assert_eq!(served.header("carpaint-study"), Some("shipped"), "{none}");
     }
     house.close().await;
 }

@@ -11,9 +11,9 @@ pub(super) const BLOCK: usize = 768;
 /// Bits of a number without its sign.
 const MAGNITUDE: u32 = 0x7fff_ffff;
 
-/// Largest magnitude of some numbers, as its bits, which compare like magnitudes; no number's are the largest of all.
+/// Largest magnitude of some numbers, as its bits: they compare like magnitudes, those of NaN above all.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Farthest(i32);
+struct Farthest(i32);
 
 impl Farthest {
     #[inline(always)]
@@ -42,9 +42,9 @@ pub(super) struct Turned {
 }
 
 impl Turned {
-    /// Puts corners in order.
+    /// Of these corners, which are in order afterwards.
     #[inline(always)]
-    fn back(low: &mut [f32], high: &mut [f32]) -> Self {
+    fn put_back(low: &mut [f32], high: &mut [f32]) -> Self {
         let mut turned = Self::default();
         for (l, h) in low.iter().zip(&*high) {
             turned.count += u32::from(h < l);
@@ -152,6 +152,7 @@ impl<W: Weight, const PAINTS: usize, const WATCH: bool, const TURN: bool> pulp::
     #[inline(always)]
     fn call(self) -> Self::Output {
         let [low, high] = self.out;
+        debug_assert!(low.len() <= BLOCK && low.len() == high.len(), "a block");
         sum_block(self.weights, self.lower, self.upper, low, high);
         let farthest = if WATCH {
             Farthest::of(low).or(Farthest::of(high))
@@ -159,7 +160,7 @@ impl<W: Weight, const PAINTS: usize, const WATCH: bool, const TURN: bool> pulp::
             Farthest::default()
         };
         let turned = if TURN {
-            Turned::back(low, high)
+            Turned::put_back(low, high)
         } else {
             Turned::default()
         };
@@ -167,7 +168,7 @@ impl<W: Weight, const PAINTS: usize, const WATCH: bool, const TURN: bool> pulp::
     }
 }
 
-/// A function of its own: its two outputs are known to be apart from everything else, so that the loop becomes vectors.
+/// Its two outputs are arguments, so that they are known to be apart from everything else and the loop becomes vectors.
 #[inline(always)]
 fn sum_block<const PAINTS: usize>(
     weights: &[impl Weight; PAINTS],

@@ -92,9 +92,8 @@ fn of_transport(page: &mut Page, blend: &Blend) {
     let report = blend.report();
     let called = |places: &[usize]| called(blend, places);
     let settings = blend.settings();
-    let order = match settings.order {
+    let order = match settings.order.among(blend.len()) {
         Order::Canonical => "by content hash",
-        _ if report.order.len() < 3 => "by content hash",
         Order::Sampled => "the cheapest as a few slices tell",
         Order::Cheapest => "the cheapest of all",
     };

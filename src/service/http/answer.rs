@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use super::problem::Problem;
 use crate::store::{BlobBytes, CachedResult, Hash};
+use crate::workshop::Lap;
 
 /// How long an answer may be kept by whoever gets it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,7 +150,7 @@ impl Answer {
 
     /// With what each of these stages took.
     #[must_use]
-    pub fn stages(mut self, stages: &[(&'static str, Duration)]) -> Self {
+    pub fn stages(mut self, stages: &[Lap]) -> Self {
         let named = stages.iter().map(|&(name, time)| (name.into(), time));
         self.stages.0.extend(named);
         self

@@ -151,6 +151,7 @@ pub fn cors(origins: &[Origin]) -> CorsLayer {
             HeaderName::from_static("x-request-id"),
             HeaderName::from_static("carpaint-accuracy"),
             HeaderName::from_static("carpaint-target"),
+            HeaderName::from_static("carpaint-study"),
         ])
         .max_age(std::time::Duration::from_hours(1))
 }

@@ -58,7 +58,8 @@ pub struct KnobsDocument {
     epsilon: Option<f64>,
     /// Cost of moving a color: `distance` in Lab, or `squared`.
     cost: Option<String>,
-    /// Order in which more than two paints are joined: `canonical`, `sampled` or `cheapest`.
+    /// Order in which more than two paints are joined: `canonical`, by content hash; the `cheapest` of all; or `sampled`,
+    /// the cheapest as a few slices tell.
     order: Option<String>,
     /// Precision of textures: `f32`, `f16` or `8bit`.
     precision: Option<String>,

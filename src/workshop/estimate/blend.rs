@@ -112,7 +112,7 @@ fn of_samples(
     // Clusters were compared on the very slices that they will be compared on; the other terms are of a sample.
     let clusters = error.terms.iter().find(|term| term.what == "clusters");
     let error = EstimatedError {
-        at_least: clusters.and_then(|term| term.lab).unwrap_or(0.0),
+        at_least: clusters.and_then(|term| term.lab),
         ..EstimatedError::lab(error.lab)
     };
     Ok(Estimate::new(profile, stages, bytes, error))

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::machine::stand_in;
 use super::{
     COLD, Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, left_at, steady,
-    step_for, this_machine, timed, write_stage,
+    step_for, this_machine, timed, wanted_on, write_stage,
 };
 use crate::accuracy::{
     Profile, clustering_error, left_out_w1, paint_error, predicted_clustering_error,
@@ -130,7 +130,9 @@ pub(super) fn of_paint(paint: PaintFile, profile: &Profile, sizes: Sizes, second
     let step = (profile.flakes.angle_step / had).max(1);
     let angles = [flakes.theta_h.len(), flakes.theta_d.len()].map(|n| left_at(n, step));
     let paints = sizes.map(|wanted| {
-        let [rows, columns] = [&flakes.theta_h, &flakes.theta_d].map(|grid| {
+        let [wanted_h, wanted_d] = wanted_on(angles, wanted);
+        let axes = [(&flakes.theta_h, wanted_h), (&flakes.theta_d, wanted_d)];
+        let [rows, columns] = axes.map(|(grid, wanted)| {
             let left = grid.every(step);
             let every = step_for(left.len(), wanted);
             let mut kept: Vec<usize> = left.iter().copied().step_by(every).collect();
@@ -243,7 +245,8 @@ fn fitted(
     let every = profile.flakes.angle_step;
     let angles = [pictures.theta_h(), pictures.theta_d()].map(|grid| left_at(grid.len(), every));
     let go = |wanted: usize| -> Result<(f64, FittedFlakes), WorkshopError> {
-        let steps = angles.map(|n| every * step_for(n, wanted));
+        let wanted = wanted_on(angles, wanted);
+        let steps = [0, 1].map(|axis| every * step_for(angles[axis], wanted[axis]));
         let thinned = Thinned::by_steps(pictures, steps);
         let (seconds, fitted) = steady(|| fit_flakes(&thinned, &settings, &|_, _| ()));
         Ok((seconds, fitted.map_err(|e| WorkshopError::input(name, e))?))

@@ -62,9 +62,10 @@ pub struct EstimatedError {
     pub value: Option<f64>,
     /// Of what: `Lab` (misplaced colors of flakes) or `CIEDE2000` (mean over a picture's pixels, by sampling).
     pub unit: &'static str,
-    /// What it will be at least, where a part of it is known already as it will be measured.
+    /// What it will be at least, in the same unit, where `value` is of a sample and a part of it is known already as it
+    /// will be measured.
     #[serde(skip)]
-    pub at_least: f64,
+    pub at_least: Option<f64>,
 }
 
 impl EstimatedError {
@@ -72,7 +73,7 @@ impl EstimatedError {
         Self {
             value,
             unit: "Lab",
-            at_least: 0.0,
+            at_least: None,
         }
     }
 }
@@ -115,6 +116,15 @@ type Sizes = [usize; 2];
 
 /// Angles of samples whose every slice is treated alike.
 const FEW_ANGLES: Sizes = [3, 6];
+
+/// Angles of a sample on each axis: of a grid that has but one on an axis, as many on the other as on both.
+fn wanted_on(angles: [usize; 2], wanted: usize) -> [usize; 2] {
+    let [h, d] = angles.map(|n| n == 1);
+    [
+        if d { wanted * wanted } else { wanted },
+        if h { wanted * wanted } else { wanted },
+    ]
+}
 
 /// Step at which an axis of so many angles is left with about `wanted`.
 fn step_for(angles: usize, wanted: usize) -> usize {

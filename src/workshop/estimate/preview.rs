@@ -6,7 +6,7 @@ use crate::blend::RealisationWeights;
 use crate::paint::Limits;
 use crate::workshop::previewing::{PictureFormat, PreviewOptions, preview, sampling};
 use crate::workshop::realising::Made;
-use crate::workshop::{Thing, WorkshopError};
+use crate::workshop::{Lap, Thing, WorkshopError};
 
 /// Pixels on the longer side of the samples; the third is drawn where the second took hardly longer than the first.
 const SIDES: [u32; 3] = [20, 56, 160];
@@ -35,12 +35,13 @@ pub struct SmallPictures {
     drawn: Vec<SmallPicture>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct SmallPicture {
     work: f64,
     seconds: f64,
     pixels: f64,
     bytes: f64,
+    stages: Vec<Lap>,
 }
 
 /// Samples come in batches: up to one a pixel takes about the same.
@@ -86,23 +87,32 @@ impl SmallPictures {
     ) -> Estimate {
         let options = work.with(profile.samples_per_pixel);
         let (seconds, bytes) = self.tell(options.size, options.samples_per_pixel);
-        let mut stages = vec![Stage {
-            stage: "draw",
-            seconds,
-        }];
+        let mut stages = self.stages(seconds);
         if work.written {
             stages.extend(write_stage(bytes));
         }
         let error = EstimatedError {
             value: error,
             unit: "CIEDE2000",
-            at_least: 0.0,
+            at_least: None,
         };
         let drawn_with = Profile {
             samples_per_pixel: options.samples_per_pixel,
             ..*profile
         };
         Estimate::new(&drawn_with, stages, bytes, error)
+    }
+
+    /// So many seconds, as the largest of them spent its own.
+    fn stages(&self, seconds: f64) -> Vec<Stage> {
+        let own = self.drawn.last().map_or(&[][..], |last| &last.stages);
+        let all: f64 = own.iter().map(|(_, time)| time.as_secs_f64()).sum();
+        own.iter()
+            .map(|&(stage, time)| Stage {
+                stage,
+                seconds: seconds * time.as_secs_f64() / all.max(f64::MIN_POSITIVE),
+            })
+            .collect()
     }
 
     /// Draws them at these numbers of pixels on the longer side; `time` says how often, and which go counts.
@@ -116,7 +126,7 @@ impl SmallPictures {
         let longer = f64::from(options.size[0].max(options.size[1]));
         let mut drawn: Vec<SmallPicture> = Vec::new();
         for &side in sides {
-            if let [first, .., last] = drawn[..]
+            if let [first, .., last] = &drawn[..]
                 && last.seconds > LONGER * first.seconds
             {
                 break;
@@ -134,15 +144,19 @@ impl SmallPictures {
             } else {
                 samples_per_pixel
             };
-            let (seconds, made) = time(PreviewOptions {
+            let of = PreviewOptions {
                 size,
                 ..work.with(samples_per_pixel)
-            });
+            };
+            let samples = of.samples_per_pixel;
+            let (seconds, made) = time(of);
+            let made = made?;
             drawn.push(SmallPicture {
-                work: pixels * batches(samples_per_pixel),
+                work: pixels * batches(samples),
                 seconds,
                 pixels,
-                bytes: made?.bytes.len() as f64,
+                bytes: made.bytes.len() as f64,
+                stages: made.stages,
             });
         }
         Ok(Self { drawn })
@@ -150,10 +164,10 @@ impl SmallPictures {
 
     /// Seconds and bytes of a picture of this size.
     fn tell(&self, size: [u32; 2], samples_per_pixel: u32) -> (f64, f64) {
-        let [.., last] = self.drawn[..] else {
+        let [first, ..] = &self.drawn[..] else {
             return (0.0, 0.0);
         };
-        let first = self.drawn[0];
+        let last = self.drawn.last().unwrap_or(first);
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let work = pixels * batches(samples_per_pixel);
         // Where something else slowed the smaller sample down, the line through both is flat and promises anything: less
@@ -229,12 +243,64 @@ pub fn estimate_preview(
 ) -> Result<Estimate, WorkshopError> {
     let samples = work.with(profile.samples_per_pixel).samples_per_pixel;
     let few = samples.min(2 * ENOUGH);
-    let sides: &[u32] = if work.options.show.is_paint() {
-        &SIDES
+    let small = if work.options.show.is_paint() {
+        SmallPictures::draw(work, few, &SIDES, |of| shortest(|| work.draw(&of)))?
     } else {
-        &SIDES_OF_ANGLES
+        SmallPictures::draw(work, 1, &SIDES_OF_ANGLES, |of| timed(|| work.draw(&of)))?
     };
-    let small = SmallPictures::draw(work, few, sides, |of| shortest(|| work.draw(&of)))?;
     let error = work.error_of(samples)?;
     Ok(small.estimate(work, profile, Some(error)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::Shape;
+    use crate::workshop::{Show, sample_by_name};
+
+    /// Getting ready takes a hundredth of a second here, a sample a microsecond.
+    fn seconds(of: &PreviewOptions) -> f64 {
+        let samples = of.size.iter().product::<u32>() * of.samples_per_pixel;
+        0.01 + 1e-6 * f64::from(samples)
+    }
+
+    #[test]
+    fn a_tiny_picture_of_many_samples_is_not_taken_for_a_large_one() {
+        let sample = sample_by_name("white").expect("a sample");
+        let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
+        let (thing, limits) = (Thing::Paint(Box::new(paint)), Limits::default());
+        for (size, samples_per_pixel) in [([8, 8], 4096), ([64, 64], 64), ([512, 384], 64)] {
+            let options = PreviewOptions {
+                show: Show::Paint,
+                scene: Shape::Sphere,
+                size,
+                samples_per_pixel,
+                environment: None,
+                lights: None,
+            };
+            let work = PictureWork {
+                thing: &thing,
+                weights: None,
+                options: &options,
+                format: PictureFormat::Png,
+                limits: &limits,
+                written: false,
+            };
+            let few = samples_per_pixel.min(2 * ENOUGH);
+            let made = |of: &PreviewOptions| {
+                let one = PreviewOptions {
+                    size: [1, 1],
+                    ..of.clone()
+                };
+                (seconds(of), work.draw(&one))
+            };
+            let small = SmallPictures::draw(&work, few, &SIDES, |of| made(&of)).expect("drawn");
+            let told = small.tell(size, samples_per_pixel).0;
+            let wanted = seconds(&options);
+            assert!(
+                (told / wanted - 1.0).abs() < 0.01,
+                "{size:?}: {told} {wanted}"
+            );
+        }
+    }
 }

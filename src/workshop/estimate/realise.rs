@@ -29,7 +29,7 @@ pub fn estimate_realise(
     written: bool,
 ) -> Result<Estimate, WorkshopError> {
     let make = |sample: &Thing| realise(sample, weights, format, profile);
-    of_file("realise", thing, profile, written, &make)
+    of_file(thing, profile, written, &make)
 }
 
 /// What writing the bundle of a whole blend will take; opening it not included.
@@ -43,12 +43,11 @@ pub fn estimate_bundle(
     written: bool,
 ) -> Result<Estimate, WorkshopError> {
     let make = |sample: &Thing| bundle_blend(sample, profile);
-    of_file("bundle", thing, profile, written, &make)
+    of_file(thing, profile, written, &make)
 }
 
 /// What `make` will take on the whole, by what it takes on two samples.
 fn of_file(
-    stage: &'static str,
     thing: &Thing,
     profile: &Profile,
     written: bool,
@@ -71,10 +70,23 @@ fn of_file(
     };
     let bytes = at(&|k| samples[k].2.bytes.len() as f64);
     let once = (first_go - samples[0].1).max(0.0);
-    let mut stages = vec![Stage {
-        stage,
-        seconds: once + COLD * at(&|k| samples[k].1),
-    }];
+    let took = |k: usize, stage: &str| -> f64 {
+        let own = samples[k]
+            .2
+            .stages
+            .iter()
+            .filter(|(name, _)| *name == stage);
+        own.map(|(_, time)| time.as_secs_f64()).sum()
+    };
+    let mut stages: Vec<Stage> = (samples[1].2.stages.iter())
+        .map(|&(stage, _)| Stage {
+            stage,
+            seconds: COLD * at(&|k| took(k, stage)),
+        })
+        .collect();
+    if let Some(last) = stages.last_mut() {
+        last.seconds += once;
+    }
     if written {
         stages.extend(write_stage(bytes));
     }

@@ -25,7 +25,7 @@ const POLICY: &str =
 #[openapi(
     info(
         title = "carpaint",
-        description = "Material synthesis for car paints: upload measurements, blend them, take realisations and pictures.\n\nEvery answer has `Server-Timing` and `X-Request-Id`, and what can be asked for again a strong `ETag`; `If-None-Match` is answered with 304. Every error is `application/problem+json` (RFC 9457). Unknown fields and parameters are refused. Requests that cannot be taken on now are answered with 503 and `Retry-After`.",
+        description = "Material synthesis for car paints: upload measurements, blend them, take realisations and pictures.\n\nEvery answer has `Server-Timing` (the stages of what was computed for it, then the whole of that with its waiting, then `total`) and `X-Request-Id`, and what can be asked for again a strong `ETag`; `If-None-Match` is answered with 304. Every error is `application/problem+json` (RFC 9457). Unknown fields and parameters are refused. Requests that cannot be taken on now are answered with 503 and `Retry-After`.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     paths(
