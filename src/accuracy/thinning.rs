@@ -125,12 +125,15 @@ mod tests {
             let seen = left_out_seen(&paint, &kept).expect("flakes");
             [seen.delta_e_2000, seen.sparkle, seen.lit]
         };
-        assert_eq!(seen([30.0; 5]), [[0.0; 6]; 3]);
+        let none = |off: f64| off < 1e-9;
+        let alike = seen([30.0; 5]);
+        assert!(alike.into_iter().flatten().all(none), "{alike:?}");
         // The light slice at 5 degrees is left out.
         let [color, sparkle, lit] = seen([30.0, 80.0, 30.0, 30.0, 30.0]);
         assert!(color[0] > 5.0 && sparkle[0] > 0.3, "{color:?} {sparkle:?}");
         for at in 2..6 {
-            assert_eq!([color[at], sparkle[at], lit[at]], [0.0; 3], "{at}");
+            let off = [color[at], sparkle[at], lit[at]];
+            assert!(off.into_iter().all(none), "{at}: {off:?}");
         }
     }
 }

@@ -43,7 +43,8 @@ pub enum AngleGridError {
 
 /// Numbers of so many slices, θd fastest, spread evenly over a grid; all of a grid that has no more.
 ///
-/// A slanted lattice: no two are of one row or column while there are enough of those.
+/// A slanted lattice: no two are of one row or column while there are enough of those. Where there are not, some may fall
+/// together, so that they are fewer.
 #[must_use]
 pub fn slices_spread_over([rows, columns]: [usize; 2], count: usize) -> Vec<usize> {
     if count >= rows * columns {

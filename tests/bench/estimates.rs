@@ -86,6 +86,14 @@ fn main() -> Outcome<()> {
             "preview sample:white --size 512x512 --spp 8 --scene panel",
             "--out x.png",
         ),
+        (
+            "preview bmw339.paint --size 300x300 --format exr",
+            "--out x.exr",
+        ),
+        (
+            "preview bmw339.paint --size 1200x900 --show aspecular --format png",
+            "--out x.png",
+        ),
     ]
     .map(|(asked, out)| (asked.to_owned(), out.to_owned()))
     .into();

@@ -104,7 +104,14 @@ async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again
         .await;
     timed(
         &file,
-        &["realise", "error", "encode", "realisation", "total"],
+        &[
+            "realise",
+            "error",
+            "certificate",
+            "encode",
+            "realisation",
+            "total",
+        ],
     );
     let again = upload(&house, &file.body).await;
     assert_eq!(again["provenance"]["simulated_flakes"], true);
