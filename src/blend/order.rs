@@ -8,9 +8,10 @@
 //! Σ_slices Σ_{i<j} Σ_k p_k w(c_k^i, c_k^j)
 //! ```
 //!
-//! at the price of trying `n!/2` orders. A few slices, spread evenly over the grid, tell nearly as well which that is, at a
-//! small part of the price. Slices are never joined in orders of their own: flakes that are followed from slice to slice
-//! would change partners.
+//! at the price of trying `n!/2` orders. A few slices, spread evenly over the grid, tell it at a small part of the price: of
+//! three of the sample paints, at 12 to 100 clusters, the very order that all slices tell, for 0.9 to 1.2 times the time of
+//! the canonical one in place of 2.4 to 3.2. Slices are never joined in orders of their own: flakes that are followed from
+//! slice to slice would change partners.
 
 use serde::{Deserialize, Serialize};
 

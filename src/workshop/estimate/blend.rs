@@ -99,7 +99,7 @@ fn of_samples(
     let mut stages: Vec<Stage> = sampled.iter().flat_map(|s| s.stages.clone()).collect();
     stages.push(Stage {
         stage: "blend",
-        seconds: at(small.0, large.0),
+        seconds: at(small.0, large.0) + sampled.iter().map(|s| s.thinning).sum::<f64>(),
     });
     if written {
         stages.push(Stage {

@@ -8,7 +8,7 @@ use super::{
     step_for, this_machine, timed, wanted_on, write_stage,
 };
 use crate::accuracy::{
-    Profile, clustering_error, left_out_w1, paint_error, predicted_clustering_error,
+    Profile, clustering_error, left_out_seen, left_out_w1, paint_error, predicted_clustering_error,
 };
 use crate::fit::{ClusterSettings, FittedFlakes, Thinned, fit_flakes};
 use crate::measurement::{FlakePictures, PackageBase};
@@ -25,6 +25,8 @@ pub(super) struct Sampled {
     pub angles: Option<[usize; 2]>,
     /// What opening it in full takes.
     pub stages: Vec<Stage>,
+    /// Seconds that leaving angles out takes, and measuring what that costs, as part of blending it.
+    pub thinning: f64,
 }
 
 /// What a measurement will take to ingest.
@@ -104,6 +106,7 @@ pub(super) fn sample(
                 paints,
                 angles: Some(angles),
                 stages,
+                thinning: 0.0,
             })
         }
         Source::Path(path) if is_measurement(&path)? => of_measurement(&path, name, options, sizes),
@@ -129,6 +132,15 @@ pub(super) fn of_paint(paint: PaintFile, profile: &Profile, sizes: Sizes, second
     let had = paint.clustering.as_ref().map_or(1, |c| c.angle_step).max(1);
     let step = (profile.flakes.angle_step / had).max(1);
     let angles = [flakes.theta_h.len(), flakes.theta_d.len()].map(|n| left_at(n, step));
+    let (thinning, left_out) = timed(|| {
+        (step > 1).then(|| {
+            let kept = flakes.thinned(step);
+            (
+                left_out_w1(flakes, step),
+                left_out_seen(&paint.paint, &kept),
+            )
+        })
+    });
     let paints = sizes.map(|wanted| {
         let [wanted_h, wanted_d] = wanted_on(angles, wanted);
         let axes = [(&flakes.theta_h, wanted_h), (&flakes.theta_d, wanted_d)];
@@ -149,8 +161,8 @@ pub(super) fn of_paint(paint: PaintFile, profile: &Profile, sizes: Sizes, second
             // As many angles as the profile wants: blending is not to thin them again.
             clustering: paint.clustering.clone().map(|c| Clustering {
                 angle_step: c.angle_step.max(profile.flakes.angle_step),
-                left_out_w1: (step > 1).then(|| left_out_w1(flakes, step)),
-                left_out_seen: None,
+                left_out_w1: left_out.map(|(w1, _)| w1),
+                left_out_seen: left_out.and_then(|(_, seen)| seen),
                 ..c
             }),
             ..paint.clone()
@@ -160,6 +172,7 @@ pub(super) fn of_paint(paint: PaintFile, profile: &Profile, sizes: Sizes, second
         paints,
         angles: Some(angles),
         stages,
+        thinning,
     }
 }
 
@@ -169,6 +182,7 @@ impl Sampled {
             paints: [paint.clone(), paint],
             angles: None,
             stages,
+            thinning: 0.0,
         }
     }
 }
@@ -226,6 +240,7 @@ fn of_measurement(
         paints,
         angles: Some(angles),
         stages,
+        thinning: 0.0,
     })
 }
 
