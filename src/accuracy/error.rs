@@ -168,13 +168,12 @@ fn each(mut all: [f64; 6], others: &[f64], of: impl Fn(f64, f64) -> f64) -> [f64
 const WITHIN: f64 = 1e-9;
 
 const SEEN: &str = "measured step by step and added up: clusters against pixels, and fewer angles against all, of several paints the \
-                    worst; a blend against exact transport, at equal weights; a file against the paint";
+                    worst; a blend against exact transport in the same order, at equal weights; a file against the paint";
 
 const CLUSTERS: &str = "measured: W1 of lightness between pixels and clusters, nine of ten of the compared slices are within; \
                         of several paints the worst";
 const REALISED: &str = "bounded: error of the blend that a paint was realised from, where it is worse than what was measured of the others";
-const UNKNOWN: &str =
-    "not known: the paint was not clustered here from pictures, or by an older version";
+const UNKNOWN: &str = "not known: the paint was not clustered here from pictures, was reduced to fewer clusters, or is of an older version";
 const TRANSPORT: &str = "bounded: mean excess of the plans' cost over the dual bound; of several pairs of paints the worst";
 const TRANSPORT_SAMPLED: &str = "bounded on slices spread evenly over the angles: mean excess of the plans' cost over the dual bound of each pair alone; of \
                                  several pairs of paints the worst";

@@ -252,6 +252,21 @@ fn accuracy(of: &ResultError, paint: &CarPaint, textures: Option<&ExportSettings
     })
 }
 
+/// Error of a thing at some weights as it is written with these settings, Lab.
+pub(super) fn error_as_written(
+    thing: &Thing,
+    weights: Option<&RealisationWeights>,
+    format: Format,
+    settings: &ExportSettings,
+) -> Result<Option<f64>, WorkshopError> {
+    let of = error_of(thing, weights);
+    if !matches!(format, Format::Zip | Format::Json) {
+        return Ok(of.lab);
+    }
+    let writing = writing_error(&choose(thing, weights)?.paint, settings);
+    Ok(file_error(&of, writing.as_ref()).lab)
+}
+
 /// Error of a thing at some weights, before anything is written of it.
 pub(super) fn error_of(thing: &Thing, weights: Option<&RealisationWeights>) -> ResultError {
     match (thing, weights) {

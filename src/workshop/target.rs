@@ -13,9 +13,8 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::estimate::{Estimate, Work};
-use super::realising::{Format, choose, error_of};
-use super::{IngestOptions, Thing, WorkshopError, blend_paints, open_paints};
-use crate::accuracy::{Knobs, Profile, blend_error, bundle_error, file_error, writing_error};
+use super::{Format, IngestOptions, WorkshopError, blend_paints, open_paints};
+use crate::accuracy::{Knobs, Profile, blend_error};
 use crate::paint::PaintFile;
 use ladder::ladder;
 
@@ -47,6 +46,9 @@ pub struct Picked {
 
 /// Part of a time limit after which no more accurate profile is looked for.
 const SEARCH_SHARE: f64 = 0.4;
+
+/// How many times longer than the last the next profile is taken to be looked at for.
+const DEARER: f64 = 1.5;
 
 /// A search for a profile, and when it began.
 struct Search(Instant);
@@ -194,9 +196,9 @@ impl Target {
         Ok(estimates)
     }
 
-    /// Estimates from the fastest on, as long as looking at the next leaves most of the time to the work: it is taken to
-    /// take as many times as long as the last as that took of the one before, at least twice. Of files the finest is the
-    /// fastest, so that it is the one to look at.
+    /// Estimates of the fastest and of ever finer ones: half of the finer ones is leapt over as long as the work is done in
+    /// time, half of what was leapt over is gone back otherwise, and no more is looked at than leaves most of the time to the
+    /// work. Of files the finest is the fastest, so that it is the one to look at.
     fn fast_enough(
         &self,
         work: &Work<'_>,
@@ -207,28 +209,29 @@ impl Target {
         if matches!(work, Work::Realise { .. } | Work::Bundle { .. }) {
             ladder.drain(..ladder.len() - 1);
         }
-        let mut estimates = Vec::new();
-        let (mut last, mut growth) = (0.0_f64, 2.0_f64);
-        for profile in ladder {
+        let mut estimates: Vec<(usize, Estimate)> = Vec::new();
+        let (mut finer, mut too_slow, mut last) = (0, ladder.len(), 0.0_f64);
+        while finer < too_slow {
             let begun = search.seconds();
-            if begun + growth * last > SEARCH_SHARE * most && !estimates.is_empty() {
+            if begun + DEARER * last > SEARCH_SHARE * most && !estimates.is_empty() {
                 break;
             }
-            let estimate = work.estimate(&profile)?;
-            let took = search.seconds() - begun;
-            growth = if last > 0.0 {
-                (took / last).max(2.0)
+            let place = if estimates.is_empty() {
+                0
             } else {
-                2.0
+                usize::midpoint(finer, too_slow)
             };
-            last = took;
-            let too_slow = !self.is_in_time(&estimate, search.seconds());
-            estimates.push(estimate);
-            if too_slow {
-                break;
+            let estimate = work.estimate(&ladder[place])?;
+            last = search.seconds() - begun;
+            if self.is_in_time(&estimate, search.seconds()) {
+                finer = place + 1;
+            } else {
+                too_slow = place;
             }
+            estimates.push((place, estimate));
         }
-        Ok(estimates)
+        estimates.sort_by_key(|(place, _)| *place);
+        Ok(estimates.into_iter().map(|(_, own)| own).collect())
     }
 
     fn picked(&self, estimate: Estimate, tried: usize, searched: f64) -> Picked {
@@ -258,6 +261,8 @@ impl Target {
         let cheapest = in_time.iter().find(|e| self.is_met(e, searched)).cloned();
         match (cheapest, self.max_error) {
             (Some(cheapest), Some(_)) => Some(cheapest),
+            // What is not known is least where least is left out.
+            _ if in_time.iter().all(|e| e.error.value.is_none()) => in_time.last().cloned(),
             _ => in_time.into_iter().min_by(finer),
         }
     }
@@ -272,23 +277,6 @@ fn measure_error(work: &Work<'_>, estimate: &mut Estimate) -> Result<(), Worksho
             let blend = blend_paints(paints, &profile, &|_| ())?.blend;
             estimate.error.value = blend_error(&blend).lab;
         }
-        Work::Realise {
-            thing,
-            weights,
-            format,
-            ..
-        } => {
-            let paint = choose(thing, weights)?.paint;
-            let writing = matches!(format, Format::Zip | Format::Json)
-                .then(|| writing_error(&paint, &profile.export))
-                .flatten();
-            estimate.error.value = file_error(&error_of(thing, weights), writing.as_ref()).lab;
-        }
-        Work::Bundle { thing, .. } => {
-            if let Thing::Blend(blend) = thing {
-                estimate.error.value = bundle_error(blend, &profile.export).lab;
-            }
-        }
         Work::BlendNames { names, options } => {
             let options = IngestOptions {
                 profile,
@@ -298,8 +286,9 @@ fn measure_error(work: &Work<'_>, estimate: &mut Estimate) -> Result<(), Worksho
             let paints: Vec<&PaintFile> = paints.iter().collect();
             measure_error(&Work::Blend { paints: &paints }, estimate)?;
         }
-        // Ingest and preview are compared on the very slices and pixels that the result is compared on.
-        Work::Ingest { .. } | Work::Preview(_) => {}
+        // An ingest and a picture are compared on the very slices and pixels that the result is compared on, a file with the
+        // whole of what is written.
+        Work::Ingest { .. } | Work::Realise { .. } | Work::Bundle { .. } | Work::Preview(_) => {}
     }
     Ok(())
 }
@@ -355,6 +344,24 @@ mod tests {
         // The search is part of what is waited for.
         assert_eq!(after(1.0, None, Some(3.5)), (2.0, true));
         assert_eq!(after(3.0, None, Some(3.5)), (1.0, false));
+    }
+
+    #[test]
+    fn of_errors_that_are_not_known_the_dearest_in_time_is_taken() {
+        let unknown: Vec<Estimate> = [1.0, 2.0, 4.0]
+            .into_iter()
+            .map(|seconds| {
+                let mut unknown = estimate(seconds, 0.0);
+                unknown.error.value = None;
+                unknown
+            })
+            .collect();
+        let target = Target {
+            max_error: Some(0.5),
+            max_seconds: Some(3.0),
+        };
+        let best = target.best(&unknown, 0.0).expect("two are in time");
+        assert_eq!((best.seconds, target.is_met(&best, 0.0)), (2.0, false));
     }
 
     #[test]

@@ -85,6 +85,25 @@ fn a_bundle_meets_a_target_and_tells_its_seconds_and_its_error() {
             "{seconds}"
         );
     }
+    // The range of the whole blend says how coarsely it is rounded.
+    let of = |work: &str| {
+        let words = format!("{work} b.blend --knob precision=8bit --json");
+        json(&desk.ok(&words.split(' ').collect::<Vec<_>>()).stdout)
+    };
+    assert_eq!(of("estimate bundle")["error"]["value"], coarse);
+    let realised = desk.ok(&[
+        "realise",
+        "b.blend",
+        "--weights",
+        "0.4,0.6",
+        "--knob",
+        "precision=8bit",
+        "--json",
+        "--out",
+        "r.zip",
+    ]);
+    let estimate = of("estimate realise --weights 0.4,0.6");
+    assert_eq!(estimate["error"]["value"], lab_of(&json(&realised.stdout)));
     let estimate = json(&desk.ok(&["estimate", "bundle", "b.blend", "--json"]).stdout);
     assert!(
         estimate["bytes"]

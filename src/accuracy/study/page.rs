@@ -108,7 +108,7 @@ fn choice(study: &Study) -> String {
         .collect();
     let (most_of_standard, all) = (most("standard"), study.fronts.len());
     format!(
-        "The presets were chosen from such fronts. `standard` is for every day: its errors, {} at most here, {} the \
+        "The presets were chosen from such fronts. `standard` is for every day: its errors, {} at most here in Lab or CIEDE2000, {} the \
          {VISIBLE} that a trained eye tells apart side by side; something measured beats it in {} of {all} kinds of work. \
          The knees, from which on time grows faster than the error falls, are here: {}; they differ from paint to paint \
          and from one kind of work to another, and `standard` is one profile for all of them. `draft` is for trying out: {} \
@@ -240,7 +240,8 @@ fn beside_knee(front: &Front) -> Option<String> {
 
 fn growth(page: &mut String, study: &Study) {
     page.push_str(
-        "## How time grows\n\n![Time against size](growth.svg)\n\n| with | what is done | from | to | time grows as | \
+        "## How time grows\n\n![Time against size](growth.svg)\n\nExponents scatter by a tenth from run to run; what is \
+         above its limit by less counts as kept.\n\n| with | what is done | from | to | time grows as | \
          should be at most |\n|---|---|---:|---:|---|---|\n",
     );
     for growth in &study.growth {

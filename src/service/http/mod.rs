@@ -21,7 +21,7 @@ mod query;
 pub mod receiving;
 mod waiting;
 
-pub use answer::{Answer, Keep};
+pub use answer::{Answer, Keep, Stages};
 pub use documented::{BlendProblems, EnvironmentProblems, JobProblems, PaintProblems, Problems};
 pub use envelope::envelope;
 pub use extract::{Address, JSON_BYTES, Json, NoQuery, Query, QueryOfTwo};

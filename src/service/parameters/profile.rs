@@ -4,6 +4,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use crate::accuracy::{Knobs, Profile, ProfileError};
+use crate::paint::Clustering;
 use crate::service::http::Problem;
 use crate::service::shelf::Shelved;
 use crate::service::work::Thing;
@@ -105,17 +106,19 @@ impl ProfileText {
         let Some(wanted) = self.0.clusters else {
             return Ok(());
         };
-        let (fits, accepted) = match &thing.thing {
+        let (fits, had, accepted) = match &thing.thing {
             Thing::Paint(paint) => (
                 check_clusters(&thing.id, paint, wanted as usize).is_ok(),
+                counts([paint.clustering.as_ref()].into_iter()),
                 "a profile without clusters, or a paint uploaded with so many",
             ),
-            Thing::Blend(_) => (
-                false,
+            Thing::Blend(blend) => (
+                (blend.clusterings()).all(|own| own.is_some_and(|c| c.clusters == wanted as usize)),
+                counts(blend.clusterings()),
                 "a profile without clusters, or a blend of paints uploaded with so many",
             ),
         };
-        let detail = format!("{} has the clusters that it has, not {wanted}.", thing.id);
+        let detail = format!("{} has {had} clusters a slice, not {wanted}.", thing.id);
         let problem = || Problem::parameter("profile", detail).accepting(accepted);
         fits.then_some(()).ok_or_else(problem)
     }
@@ -137,6 +140,16 @@ impl ProfileText {
     }
 }
 
+/// Most clusters of a slice, paint by paint.
+fn counts<'a>(of: impl Iterator<Item = Option<&'a Clustering>>) -> String {
+    let each = of.map(|own| {
+        own.map_or("an unknown number of".to_owned(), |c| {
+            c.clusters.to_string()
+        })
+    });
+    each.collect::<Vec<_>>().join(" and ")
+}
+
 fn sentence(error: &ProfileError) -> String {
     match error {
         ProfileError::Range { knob, value, .. } => format!("{knob} is {value}."),
@@ -147,6 +160,7 @@ fn sentence(error: &ProfileError) -> String {
 fn accepting(problem: Problem, error: &ProfileError) -> Problem {
     problem.accepting(match error {
         ProfileError::Range { accepted, .. } => (*accepted).to_owned(),
+        ProfileError::Epsilon => "transport sinkhorn beside it, or no epsilon".to_owned(),
         _ => ACCEPTED.to_owned(),
     })
 }

@@ -10,7 +10,7 @@ use axum::http::{HeaderName, HeaderValue};
 use axum::response::Response;
 use serde_json::{Map, Value};
 
-use crate::service::http::{Answer, Keep, Problem};
+use crate::service::http::{Answer, Keep, Problem, Stages};
 use crate::service::shelf::Shelved;
 use crate::service::work::{Picked, Target, TargetDocument, WorkshopError};
 
@@ -94,29 +94,31 @@ pub fn told_with(thing: &Shelved, picked: Option<&Picked>) -> Result<Answer, Pro
     Ok(Answer::json(&document, Keep::Never))
 }
 
-/// A response that says what was picked.
+/// A response that says what was picked, and what looking for it took.
 pub fn told(mut response: Response, picked: Option<&Picked>) -> Response {
-    if let Some(value) = picked.and_then(|p| HeaderValue::from_str(&p.line()).ok()) {
+    let Some(picked) = picked else {
+        return response;
+    };
+    if let Ok(value) = HeaderValue::from_str(&picked.line()) {
         response.headers_mut().insert(TARGET, value);
     }
+    let stages = response.extensions_mut().get_or_insert_default::<Stages>();
+    let searched = Duration::from_secs_f64(picked.searched);
+    stages.0.insert(0, (SEARCH.into(), searched));
     response
 }
 
+/// The stage of looking for a profile.
+const SEARCH: &str = "profile";
+
 impl Answer {
-    /// With what was picked for a target.
+    /// With what was picked for a target, and what looking for it took.
     #[must_use]
     pub fn picked(self, picked: Option<&Picked>) -> Self {
         match picked {
-            Some(picked) => self.header(TARGET, &picked.line()),
-            None => self,
-        }
-    }
-
-    /// The same, and what looking for it took.
-    #[must_use]
-    pub fn picked_in(self, picked: Option<&Picked>, time: Duration) -> Self {
-        match picked {
-            Some(_) => self.picked(picked).stage("profile", time),
+            Some(picked) => self
+                .header(TARGET, &picked.line())
+                .stage(SEARCH, Duration::from_secs_f64(picked.searched)),
             None => self,
         }
     }

@@ -32,14 +32,12 @@ pub async fn bundle(
     Address(id): Address<String>,
     Query(query): Query<ProfileQuery>,
 ) -> Result<Answer, Problem> {
-    let begun = Instant::now();
     let blend = app.blend(&id).await?;
     let whole = ("bundle", &blend.id, blend.file);
     let found = query.profile_of(&app, &blend, &whole, |works, thing, target| {
         works.pick(&Asked::Bundle { thing }, target)
     });
     let (profile, picked) = found.await?;
-    let searched = begun.elapsed();
     let begun = Instant::now();
     let key = ids::result("blend_bundle", &(&blend.id, blend.file, profile.export));
     let name = format!("{}.zip", blend.id);
@@ -67,7 +65,7 @@ pub async fn bundle(
     let result = app.results.get_or_compute(key, compute).await?;
     let answer = Answer::result("application/zip", result, keep).saved_as(&name);
     Ok(answer
-        .picked_in(picked.as_ref(), searched)
+        .picked(picked.as_ref())
         .stages(took.get().map_or(&[], Vec::as_slice))
         .stage("bundle", begun.elapsed()))
 }

@@ -46,6 +46,9 @@ pub struct EstimateDocument {
     /// Of a target, whether it is met; if not, the estimate is of the best that can be done.
     #[serde(skip_serializing_if = "Option::is_none")]
     met: Option<bool>,
+    /// Of a target, seconds that looking for a profile took: they are part of `max_seconds`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    searched: Option<f64>,
 }
 
 /// What is needed to estimate.
@@ -113,7 +116,7 @@ pub async fn create(
         let estimate = |asked: &Asked<'_>| {
             if target.is_some() {
                 let picked = works.pick(asked, &target)?;
-                Ok((picked.estimate, Some(picked.met)))
+                Ok((picked.estimate, Some((picked.met, picked.searched))))
             } else {
                 works.estimate(asked, &profile).map(|made| (made, None))
             }
@@ -122,15 +125,15 @@ pub async fn create(
         let done = needed.with_asked(environment.as_deref(), estimate);
         done.map_err(told)
     });
-    let (estimate, met) = estimated.await??;
+    let (estimate, picked) = estimated.await??;
     Ok(Answer::json(
-        &EstimateDocument::of(&estimate, met),
+        &EstimateDocument::of(&estimate, picked),
         Keep::Never,
     ))
 }
 
 impl EstimateDocument {
-    fn of(estimate: &Estimate, met: Option<bool>) -> Self {
+    fn of(estimate: &Estimate, picked: Option<(bool, f64)>) -> Self {
         Self {
             profile: estimate.profile,
             knobs: estimate.knobs,
@@ -138,7 +141,8 @@ impl EstimateDocument {
             stages: serde_json::to_value(&estimate.stages).unwrap_or_default(),
             bytes: estimate.bytes,
             error: serde_json::to_value(estimate.error).unwrap_or_default(),
-            met,
+            met: picked.map(|(met, _)| met),
+            searched: picked.map(|(_, seconds)| seconds),
         }
     }
 }

@@ -69,7 +69,6 @@ async fn realise(
     format: Format,
     query: ProfileQuery,
 ) -> Result<Answer, Problem> {
-    let begun = Instant::now();
     let whole = (&thing.id, thing.file, &weights, format);
     let of = weights.clone();
     let found = query.profile_of(app, &thing, &whole, move |works, thing, target| {
@@ -81,7 +80,6 @@ async fn realise(
         works.pick(&asked, target)
     });
     let (profile, picked) = found.await?;
-    let searched = begun.elapsed();
     let begun = Instant::now();
     let key = ids::result(
         "realisation",
@@ -114,7 +112,7 @@ async fn realise(
     };
     let answer = Answer::result(format.media_type(), result, keep).saved_as(&name);
     Ok(answer
-        .picked_in(picked.as_ref(), searched)
+        .picked(picked.as_ref())
         .stages(took.get().map_or(&[], Vec::as_slice))
         .stage("realisation", begun.elapsed()))
 }

@@ -98,6 +98,14 @@ impl Estimate {
     }
 
     fn new(profile: &Profile, stages: Vec<Stage>, bytes: f64, error: EstimatedError) -> Self {
+        let mut named: Vec<Stage> = Vec::with_capacity(stages.len());
+        for own in stages {
+            match named.iter_mut().find(|stage| stage.stage == own.stage) {
+                Some(stage) => stage.seconds += own.seconds,
+                None => named.push(own),
+            }
+        }
+        let stages = named;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a size
         let bytes = bytes.max(0.0).round() as u64;
         Self {

@@ -3,11 +3,11 @@
 use super::{
     Estimate, EstimatedError, Stage, extrapolated, shortest, step_for, timed, write_stage,
 };
-use crate::accuracy::Profile;
+use crate::accuracy::{Profile, bundle_error};
 use crate::blend::{Blend, RealisationWeights};
 use crate::paint::{CarPaint, Flakes, PaintFile};
 use crate::workshop::bundling::bundle_blend;
-use crate::workshop::realising::{Format, Made, realise};
+use crate::workshop::realising::{Format, Made, error_as_written, realise};
 use crate::workshop::{Thing, WorkshopError};
 
 /// Angles on an axis of the two samples: writing has a fixed part that small samples say little of.
@@ -29,7 +29,8 @@ pub fn estimate_realise(
     written: bool,
 ) -> Result<Estimate, WorkshopError> {
     let make = |sample: &Thing| realise(sample, weights, format, profile);
-    of_file(thing, profile, written, &make)
+    let error = error_as_written(thing, weights, format, &profile.export)?;
+    of_file(thing, profile, written, error, &make)
 }
 
 /// What writing the bundle of a whole blend will take; opening it not included.
@@ -43,14 +44,20 @@ pub fn estimate_bundle(
     written: bool,
 ) -> Result<Estimate, WorkshopError> {
     let make = |sample: &Thing| bundle_blend(sample, profile);
-    of_file(thing, profile, written, &make)
+    let error = match thing {
+        Thing::Blend(blend) => bundle_error(blend, &profile.export).lab,
+        Thing::Paint(_) => None,
+    };
+    of_file(thing, profile, written, error, &make)
 }
 
-/// What `make` will take on the whole, by what it takes on two samples.
+/// What `make` will take on the whole, by what it takes on two samples; the error is of the whole, for its range says how
+/// coarsely it is rounded.
 fn of_file(
     thing: &Thing,
     profile: &Profile,
     written: bool,
+    error: Option<f64>,
     make: &dyn Fn(&Thing) -> Result<Made, WorkshopError>,
 ) -> Result<Estimate, WorkshopError> {
     let whole = slices(thing);
@@ -90,9 +97,6 @@ fn of_file(
     if written {
         stages.extend(write_stage(bytes));
     }
-    let report = &samples[1].2.report;
-    let error = report.pointer("/accuracy/error/lab");
-    let error = error.and_then(serde_json::Value::as_f64);
     Ok(Estimate::new(
         profile,
         stages,

@@ -13,12 +13,14 @@ pub(super) fn ladder(work: &Work<'_>) -> Vec<Profile> {
         angle_step,
         ..standard.flakes
     };
+    // Paints that came of a blend are reduced by all but the last.
     let every_other_angle_or_all = vec![
         Profile {
             flakes: clustered(standard.flakes.clusters, 2),
             ..standard
         },
         standard,
+        Profile::reference(),
     ];
     match work {
         Work::Ingest { .. } => [
