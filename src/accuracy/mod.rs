@@ -2,7 +2,8 @@
 //!
 //! Every room owns its settings; a [`Profile`] is those settings together, handed down as they are. No room below asks
 //! what the profile is called. What a result's settings cost in accuracy is measured here: [`clustering_error`] of an
-//! ingest, [`blend_deviation`] of a correspondence, [`writing_error`] of a file, [`sparkle`] of any paint.
+//! ingest, [`blend_deviation`] of a correspondence, [`left_out_w1`] and [`left_out_seen`] of angles, [`writing_error`] of a
+//! file, [`sparkle`] of any paint.
 //!
 //! Promised: an error is measured or bounded, says which, and is none at all where it is not known. Left to others: time,
 //! which only `workshop` can measure; picking a profile for a target (`workshop`).
