@@ -21,6 +21,7 @@ mod energy;
 mod file;
 mod finite;
 mod flakes;
+mod lattice;
 mod lightness;
 mod limits;
 mod lobe;
@@ -32,7 +33,7 @@ mod shared_list;
 mod sparkle;
 mod validate;
 
-pub use angle::{AngleGrid, AngleGridError, Bracket, LEAST_STEP_DEG, slices_spread_over};
+pub use angle::{AngleGrid, AngleGridError, Bracket, LEAST_STEP_DEG};
 pub(crate) use angle::{QuickBracket, QuickGrid};
 pub use box_color::{center_of_mean, mean_color};
 pub use cells::{RandomTexture, cell_spacing};
@@ -46,6 +47,7 @@ pub use file::{Clustering, NAME_CHARACTERS, PaintFile, PaintFileError, Provenanc
 pub use finite::NotFinite;
 pub(crate) use finite::{check_corners, check_list};
 pub use flakes::{FlakeTexture, Flakes, Slice};
+pub use lattice::slices_spread_over;
 pub use lightness::LightnessMixture;
 pub use limits::Limits;
 pub use lobe::Lobe;
