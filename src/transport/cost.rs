@@ -128,7 +128,7 @@ impl CostMatrix {
     }
 
     /// All rows in order.
-    pub(super) fn rows(&self) -> impl Iterator<Item = &[[f64; LANES]]> + Clone {
+    pub(super) fn rows(&self) -> impl ExactSizeIterator<Item = &[[f64; LANES]]> + Clone {
         self.lanes.chunks_exact(self.stride)
     }
 

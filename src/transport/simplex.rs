@@ -16,7 +16,7 @@ use super::cost::{Cost, CostMatrix, LANES};
 use super::plan::{Plan, target_duals_for};
 use super::problem::{Problem, TransportError};
 use super::start::{StartMemory, cheaper_start, column_of, row_minimum};
-use super::tree::{Tree, for_each_point};
+use super::tree::{Tree, shift};
 use super::units::Units;
 use super::workspace::Workspace;
 use super::{LinearProgram, Solver};
@@ -174,7 +174,7 @@ impl Job<'_> {
         tree.potentials(cost, source_values, target_values.as_flattened_mut());
         loop {
             let before = pricing.pivots;
-            if !pricing.pivot_until_right(tree, matrix, source_values, target_values) {
+            if !pricing.pivot_until_right(tree, matrix, target_values) {
                 return false;
             }
             let pivoted = pricing.pivots > before;
@@ -235,17 +235,19 @@ impl Pricing {
         &mut self,
         tree: &mut Tree<W>,
         matrix: &CostMatrix,
-        source_values: &mut [f64],
         target_values: &mut [[f64; LANES]],
     ) -> bool {
-        let rows = source_values.len();
+        let rows = matrix.rows().len();
         let stride = spreading_stride(rows);
         let mut source = 0;
         let mut right_in_turn = 0;
         while right_in_turn < rows {
             let row = matrix.row(source);
             let minimum = row_minimum(row, target_values);
-            let reduced = minimum - source_values[source];
+            // The source's value: the edge to its parent is tight.
+            let parent = tree.parent_of(source);
+            let value = row.as_flattened()[parent] - target_values.as_flattened()[parent];
+            let reduced = minimum - value;
             if reduced < -self.tolerance {
                 if self.pivots == self.most_pivots {
                     return false;
@@ -259,9 +261,7 @@ impl Pricing {
                 let swing = tree.pivot(source, target);
                 // The entering edge becomes tight: its moved end takes the whole reduced cost.
                 let step = if swing.with_source { reduced } else { -reduced };
-                let target_values = target_values.as_flattened_mut();
-                for_each_point(&swing.moved.sources, |i| source_values[i] += step);
-                for_each_point(&swing.moved.targets, |j| target_values[j] -= step);
+                shift(&swing.moved, target_values, -step);
                 // The same row again: that takes fewer pricings than going on to the next.
                 continue;
             }

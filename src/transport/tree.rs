@@ -1,45 +1,33 @@
 //! The basis of the transportation simplex: a spanning tree over sources and targets.
 //!
-//! Each point knows its parent, the flow on the edge to it, and the set of points below it as bits. The sets make a pivot
-//! short: whether a point is above another is one bit, the part of the tree that swings over is one set, and its points
-//! are visited by scanning bits, with no list to keep in order.
+//! Each point knows its parent, the flow on the edge to it, and the set of targets below it as bits. The sets make a pivot
+//! short: whether a point is above a target is one bit, above a source it is its parent's bit, and the part of the tree that swings over is one set, whose values
+//! move eight at a time. Sources are in no set: a source's value follows from its parent's.
 
+use super::cost::LANES;
 use super::start::Closing;
 
-/// A set of points; `W` words of 64 for each side.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PointSet<const W: usize> {
-    pub sources: [u64; W],
-    pub targets: [u64; W],
+/// A set of targets: `W` words of 64.
+type TargetSet<const W: usize> = [u64; W];
+
+#[inline(always)]
+fn join<const W: usize>(set: &mut TargetSet<W>, other: &TargetSet<W>) {
+    for (word, other) in set.iter_mut().zip(other) {
+        *word |= other;
+    }
 }
 
-impl<const W: usize> PointSet<W> {
-    const EMPTY: Self = Self {
-        sources: [0; W],
-        targets: [0; W],
-    };
-
-    #[inline(always)]
-    fn join(&mut self, other: &Self) {
-        for w in 0..W {
-            self.sources[w] |= other.sources[w];
-            self.targets[w] |= other.targets[w];
-        }
+#[inline(always)]
+fn leave<const W: usize>(set: &mut TargetSet<W>, other: &TargetSet<W>) {
+    for (word, other) in set.iter_mut().zip(other) {
+        *word &= !other;
     }
+}
 
-    #[inline(always)]
-    fn leave(&mut self, other: &Self) {
-        for w in 0..W {
-            self.sources[w] &= !other.sources[w];
-            self.targets[w] &= !other.targets[w];
-        }
-    }
-
-    #[inline(always)]
-    fn without(mut self, other: &Self) -> Self {
-        self.leave(other);
-        self
-    }
+#[inline(always)]
+fn without<const W: usize>(mut set: TargetSet<W>, other: &TargetSet<W>) -> TargetSet<W> {
+    leave(&mut set, other);
+    set
 }
 
 #[inline(always)]
@@ -54,12 +42,36 @@ fn insert<const W: usize>(words: &mut [u64; W], point: usize) {
 
 /// Calls `visit` with every point of a set of words, ascending.
 #[inline(always)]
-pub(super) fn for_each_point<const W: usize>(words: &[u64; W], mut visit: impl FnMut(usize)) {
+fn for_each_point<const W: usize>(words: &[u64; W], mut visit: impl FnMut(usize)) {
     for (w, &word) in words.iter().enumerate() {
         let mut rest = word;
         while rest != 0 {
             visit(w * 64 + rest.trailing_zeros() as usize);
             rest &= rest - 1;
+        }
+    }
+}
+
+/// Adds `step` to the values of a set's targets.
+#[inline(always)]
+pub(super) fn shift<const W: usize>(set: &TargetSet<W>, values: &mut [[f64; LANES]], step: f64) {
+    for (w, word) in set.iter().enumerate() {
+        let mut rest = *word;
+        let mut block = w * (64 / LANES);
+        while rest != 0 {
+            let lanes_of = rest & ((1 << LANES) - 1);
+            if lanes_of != 0 {
+                let lanes = &mut values[block];
+                for lane in 0..LANES {
+                    lanes[lane] += if lanes_of & (1 << lane) != 0 {
+                        step
+                    } else {
+                        0.0
+                    };
+                }
+            }
+            rest >>= LANES;
+            block += 1;
         }
     }
 }
@@ -71,15 +83,15 @@ struct Branch<const W: usize> {
     parent: usize,
     /// Grains on the edge to the parent.
     flow: i64,
-    /// Itself and all points below.
-    below: PointSet<W>,
+    /// All targets below, itself if it is one.
+    below: TargetSet<W>,
 }
 
-/// What a pivot did: which points swung over, and from which end of the entering edge they hang now.
+/// What a pivot did: which targets swung over, and with which end of the entering edge.
 pub(super) struct Swing<const W: usize> {
-    /// The points that moved.
-    pub moved: PointSet<W>,
-    /// Whether they hang from the entering edge's target, and hold its source.
+    /// The targets that moved; none, where a source moved alone.
+    pub moved: TargetSet<W>,
+    /// Whether the entering edge's source moved with them, to hang from its target.
     pub with_source: bool,
 }
 
@@ -89,9 +101,9 @@ pub(super) struct Tree<const W: usize> {
     sources: Vec<Branch<W>>,
     targets: Vec<Branch<W>>,
     root: usize,
-    /// Scratch: for each target the sources below it, for each source the targets below it, and points to visit.
-    below_target: Vec<[u64; W]>,
-    below_source: Vec<[u64; W]>,
+    /// Scratch: for each target the sources that hang from it, for each source the targets, and points to visit.
+    children_of_target: Vec<[u64; W]>,
+    children_of_source: Vec<[u64; W]>,
     queue: Vec<usize>,
 }
 
@@ -101,17 +113,14 @@ impl<const W: usize> Tree<W> {
         let leaf = Branch {
             parent: 0,
             flow: 0,
-            below: PointSet::EMPTY,
+            below: [0; W],
         };
         self.sources.clear();
         self.sources.resize(sources, leaf);
         self.targets.clear();
         self.targets.resize(targets, leaf);
-        for (i, branch) in self.sources.iter_mut().enumerate() {
-            insert(&mut branch.below.sources, i);
-        }
         for (j, branch) in self.targets.iter_mut().enumerate() {
-            insert(&mut branch.below.targets, j);
+            insert(&mut branch.below, j);
         }
         for &step in steps {
             match step {
@@ -124,7 +133,7 @@ impl<const W: usize> Tree<W> {
                     branch.parent = parent;
                     branch.flow = grains;
                     let below = branch.below;
-                    self.targets[parent].below.join(&below);
+                    join(&mut self.targets[parent].below, &below);
                     self.root = parent;
                 }
                 Closing::Target {
@@ -136,10 +145,16 @@ impl<const W: usize> Tree<W> {
                     branch.parent = parent;
                     branch.flow = grains;
                     let below = branch.below;
-                    self.sources[parent].below.join(&below);
+                    join(&mut self.sources[parent].below, &below);
                 }
             }
         }
+    }
+
+    /// The target that a source hangs from.
+    #[inline(always)]
+    pub(super) fn parent_of(&self, source: usize) -> usize {
+        self.sources[source].parent
     }
 
     /// Brings in the edge from `source` to `target` and takes out the edge whose flow falls to zero first.
@@ -154,7 +169,7 @@ impl<const W: usize> Tree<W> {
         let mut at = source;
         loop {
             let branch = &self.sources[at];
-            if holds(&branch.below.targets, target) {
+            if holds(&branch.below, target) {
                 break;
             }
             if branch.flow < least {
@@ -164,17 +179,19 @@ impl<const W: usize> Tree<W> {
             let up = branch.parent;
             source_way += 1;
             let branch = &self.targets[up];
-            if holds(&branch.below.targets, target) {
+            if holds(&branch.below, target) {
                 break;
             }
             at = branch.parent;
             source_way += 1;
         }
+        // Whoever is above the source's parent is above the source.
+        let parent = self.sources[source].parent;
         let mut target_way = 0;
         let mut at = target;
         loop {
             let branch = &self.targets[at];
-            if holds(&branch.below.sources, source) {
+            if holds(&branch.below, parent) {
                 break;
             }
             if branch.flow < least {
@@ -185,7 +202,7 @@ impl<const W: usize> Tree<W> {
             let up = branch.parent;
             target_way += 1;
             let branch = &self.sources[up];
-            if holds(&branch.below.sources, source) {
+            if up == source || holds(&branch.below, parent) {
                 break;
             }
             at = branch.parent;
@@ -224,10 +241,10 @@ impl<const W: usize> Tree<W> {
         while let Some(&target) = self.queue.get(visited) {
             visited += 1;
             let value = target_values[target];
-            for_each_point(&self.below_target[target], |source| {
+            for_each_point(&self.children_of_target[target], |source| {
                 let value = cost(source, target) - value;
                 source_values[source] = value;
-                for_each_point(&self.below_source[source], |target| {
+                for_each_point(&self.children_of_source[source], |target| {
                     target_values[target] = cost(source, target) - value;
                     self.queue.push(target);
                 });
@@ -237,7 +254,12 @@ impl<const W: usize> Tree<W> {
 
     /// Visits all edges with their flows, by source, then target. Call after [`Tree::potentials`].
     pub(super) fn for_each_edge(&self, mut visit: impl FnMut(usize, usize, i64)) {
-        for (source, (branch, below)) in self.sources.iter().zip(&self.below_source).enumerate() {
+        for (source, (branch, below)) in self
+            .sources
+            .iter()
+            .zip(&self.children_of_source)
+            .enumerate()
+        {
             let parent = branch.parent;
             let mut edges = *below;
             insert(&mut edges, parent);
@@ -253,16 +275,16 @@ impl<const W: usize> Tree<W> {
     }
 
     fn list_children(&mut self) {
-        self.below_source.clear();
-        self.below_source.resize(self.sources.len(), [0; W]);
-        self.below_target.clear();
-        self.below_target.resize(self.targets.len(), [0; W]);
+        self.children_of_source.clear();
+        self.children_of_source.resize(self.sources.len(), [0; W]);
+        self.children_of_target.clear();
+        self.children_of_target.resize(self.targets.len(), [0; W]);
         for (i, branch) in self.sources.iter().enumerate() {
-            insert(&mut self.below_target[branch.parent], i);
+            insert(&mut self.children_of_target[branch.parent], i);
         }
         for (j, branch) in self.targets.iter().enumerate() {
             if j != self.root {
-                insert(&mut self.below_source[branch.parent], j);
+                insert(&mut self.children_of_source[branch.parent], j);
             }
         }
     }
@@ -286,7 +308,7 @@ impl Cycle {
         &self,
         (near, start, mut near_way): (&mut [Branch<W>], usize, usize),
         (far, partner, far_way): (&mut [Branch<W>], usize, usize),
-    ) -> PointSet<W> {
+    ) -> TargetSet<W> {
         let moved = near[self.leaving].below;
 
         let mut at = partner;
@@ -294,14 +316,14 @@ impl Cycle {
         while rest > 0 {
             let branch = &mut far[at];
             branch.flow -= self.flow;
-            branch.below.join(&moved);
+            join(&mut branch.below, &moved);
             at = branch.parent;
             if rest == 1 {
                 break;
             }
             let branch = &mut near[at];
             branch.flow += self.flow;
-            branch.below.join(&moved);
+            join(&mut branch.below, &moved);
             at = branch.parent;
             rest -= 2;
         }
@@ -325,14 +347,14 @@ impl Cycle {
                 Branch {
                     parent: at,
                     flow: old.flow - self.flow,
-                    below: moved.without(&old.below),
+                    below: without(moved, &old.below),
                 },
             );
             near_way -= 1;
             turned = Branch {
                 parent: old.parent,
                 flow: old_up.flow + self.flow,
-                below: moved.without(&old_up.below),
+                below: without(moved, &old_up.below),
             };
             at = old_up.parent;
         };
@@ -340,14 +362,14 @@ impl Cycle {
         while near_way > 0 {
             let branch = &mut far[above];
             branch.flow += self.flow;
-            branch.below.leave(&moved);
+            leave(&mut branch.below, &moved);
             above = branch.parent;
             if near_way == 1 {
                 break;
             }
             let branch = &mut near[above];
             branch.flow -= self.flow;
-            branch.below.leave(&moved);
+            leave(&mut branch.below, &moved);
             above = branch.parent;
             near_way -= 2;
         }

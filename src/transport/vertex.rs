@@ -61,13 +61,8 @@ pub(super) fn vertex_below(
         forest.take(flow, matrix);
     }
     plan.restart();
-    for source in 0..problem.source().len() {
-        let mut edges = forest.edges[source].clone();
-        edges.sort_unstable_by_key(|edge| edge.to);
-        for edge in edges {
-            let target = edge.to - problem.source().len();
-            plan.push(units, source, target, edge.grains);
-        }
+    for edge in forest.edges() {
+        plan.push(units, edge.source, edge.target, edge.grains);
     }
 }
 
@@ -104,122 +99,144 @@ pub(super) fn residual_duals(
     }
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Edge {
-    to: usize,
-    grains: i64,
-}
-
-/// Edges with flow, listed at both ends; sources first, targets behind them.
+/// Edges with flow, each known to the end that hangs from the other; sources first, targets behind them.
 struct Forest {
     sources: usize,
-    edges: Vec<Vec<Edge>>,
-    /// Scratch of the search: where a point was reached from.
-    reached: Vec<Option<usize>>,
+    /// What a point hangs from, and the grains on that edge; none for a root.
+    up: Vec<Option<(usize, i64)>>,
+    /// Scratch: the ways up from both ends of a new edge, and for each point the search in which it was on the source's.
+    source_way: Vec<usize>,
+    target_way: Vec<usize>,
+    passed: Vec<usize>,
+    searches: usize,
 }
 
 impl Forest {
     fn new(sources: usize, targets: usize) -> Self {
         Self {
             sources,
-            edges: vec![Vec::new(); sources + targets],
-            reached: vec![None; sources + targets],
+            up: vec![None; sources + targets],
+            source_way: Vec::new(),
+            target_way: Vec::new(),
+            passed: vec![0; sources + targets],
+            searches: 0,
         }
     }
 
     /// Takes in a flow; keeps the forest a forest.
     fn take(&mut self, flow: Flow, matrix: &CostMatrix) {
         let (from, to) = (flow.source, self.sources + flow.target);
-        let Some(way) = self.way(from, to) else {
-            self.add(from, to, flow.grains);
-            return;
-        };
-        if let [from, to] = way[..] {
-            self.add(from, to, flow.grains);
+        if !self.find_cycle(from, to) {
+            self.link(from, to, flow.grains);
             return;
         }
-        // Along the way from the source, flow on the 1st, 3rd, … edge falls when the new edge's rises.
-        let cost = |pair: &[usize]| {
-            let (source, target) = (pair[0].min(pair[1]), pair[0].max(pair[1]));
-            matrix.at(source, target - self.sources)
-        };
+        // Around the cycle flow falls and rises in turn, from the source up as from the target up: with the new edge's
+        // rising, it falls on the 1st, 3rd, … of both ways.
         let mut change = matrix.at(flow.source, flow.target);
-        for (step, pair) in way.windows(2).enumerate() {
-            change += if step.is_multiple_of(2) {
-                -cost(pair)
-            } else {
-                cost(pair)
-            };
+        for way in [&self.source_way, &self.target_way] {
+            for (step, &point) in way.iter().enumerate() {
+                let cost = self.cost_up(point, matrix);
+                change += if step.is_multiple_of(2) { -cost } else { cost };
+            }
         }
         let raise = change < 0.0;
         let falls = |step: usize| step.is_multiple_of(2) == raise;
         let mut turn = if raise { i64::MAX } else { flow.grains };
-        for (step, pair) in way.windows(2).enumerate() {
-            if falls(step) {
-                turn = turn.min(self.grains(pair[0], pair[1]));
-            }
-        }
-        for (step, pair) in way.windows(2).enumerate() {
-            self.add(pair[0], pair[1], if falls(step) { -turn } else { turn });
-        }
-        self.add(
-            from,
-            to,
-            if raise {
-                flow.grains + turn
-            } else {
-                flow.grains - turn
-            },
-        );
-    }
-
-    fn grains(&self, a: usize, b: usize) -> i64 {
-        self.edges[a]
-            .iter()
-            .find(|edge| edge.to == b)
-            .map_or(0, |edge| edge.grains)
-    }
-
-    /// Adds grains to an edge, which comes and goes with its flow.
-    fn add(&mut self, a: usize, b: usize, grains: i64) {
-        for (a, b) in [(a, b), (b, a)] {
-            let edges = &mut self.edges[a];
-            if let Some(at) = edges.iter().position(|edge| edge.to == b) {
-                edges[at].grains += grains;
-                if edges[at].grains == 0 {
-                    edges.swap_remove(at);
+        for way in [&self.source_way, &self.target_way] {
+            for (step, &point) in way.iter().enumerate() {
+                if let (true, Some((_, grains))) = (falls(step), self.up[point]) {
+                    turn = turn.min(grains);
                 }
-            } else if grains != 0 {
-                edges.push(Edge { to: b, grains });
             }
+        }
+        for way in [&self.source_way, &self.target_way] {
+            for (step, &point) in way.iter().enumerate() {
+                let change = if falls(step) { -turn } else { turn };
+                self.up[point] = self.up[point]
+                    .map(|(parent, grains)| (parent, grains + change))
+                    .filter(|&(_, grains)| grains > 0);
+            }
+        }
+        let grains = if raise {
+            flow.grains + turn
+        } else {
+            flow.grains - turn
+        };
+        if grains > 0 {
+            self.link(from, to, grains);
         }
     }
 
-    /// The points on the way between two points, both included.
-    fn way(&mut self, from: usize, to: usize) -> Option<Vec<usize>> {
-        self.reached.fill(None);
-        self.reached[from] = Some(from);
-        let mut open = vec![from];
-        while let Some(at) = open.pop() {
-            if at == to {
+    /// Lists the points from either end up to where the ways meet, which is not listed; false if they do not.
+    fn find_cycle(&mut self, from: usize, to: usize) -> bool {
+        self.searches += 1;
+        self.source_way.clear();
+        self.target_way.clear();
+        let mut at = from;
+        loop {
+            self.passed[at] = self.searches;
+            self.source_way.push(at);
+            let Some((parent, _)) = self.up[at] else {
                 break;
-            }
-            for edge in &self.edges[at] {
-                if self.reached[edge.to].is_none() {
-                    self.reached[edge.to] = Some(at);
-                    open.push(edge.to);
-                }
-            }
+            };
+            at = parent;
         }
-        self.reached[to]?;
-        let mut way = vec![to];
+        at = to;
+        while self.passed[at] != self.searches {
+            self.target_way.push(at);
+            let Some((parent, _)) = self.up[at] else {
+                return false;
+            };
+            at = parent;
+        }
+        let meets = self.source_way.iter().position(|&point| point == at);
+        self.source_way.truncate(meets.unwrap_or(0));
+        true
+    }
+
+    /// What a grain costs on the edge up from a point; 0 for a root.
+    fn cost_up(&self, point: usize, matrix: &CostMatrix) -> f64 {
+        self.up[point].map_or(0.0, |(parent, _)| {
+            let (source, target) = self.pair(point, parent);
+            matrix.at(source, target)
+        })
+    }
+
+    fn pair(&self, a: usize, b: usize) -> (usize, usize) {
+        (a.min(b), a.max(b) - self.sources)
+    }
+
+    /// Joins two trees by an edge: the target's is turned round to hang from the source.
+    fn link(&mut self, from: usize, to: usize, grains: i64) {
+        let mut hung = Some((from, grains));
         let mut at = to;
-        while at != from {
-            at = self.reached[at]?;
-            way.push(at);
+        loop {
+            let Some((parent, grains)) = std::mem::replace(&mut self.up[at], hung) else {
+                return;
+            };
+            hung = Some((at, grains));
+            at = parent;
         }
-        way.reverse();
-        Some(way)
+    }
+
+    /// All edges with their grains, by source, then target.
+    fn edges(&self) -> Vec<Flow> {
+        let mut edges: Vec<Flow> = self
+            .up
+            .iter()
+            .enumerate()
+            .filter_map(|(point, up)| {
+                let (parent, grains) = (*up)?;
+                let (source, target) = self.pair(point, parent);
+                Some(Flow {
+                    source,
+                    target,
+                    grains,
+                })
+            })
+            .collect();
+        edges.sort_unstable_by_key(|edge| (edge.source, edge.target));
+        edges
     }
 }
 
