@@ -58,9 +58,8 @@ impl Account {
 
     /// Counts what was put in order on its way.
     fn turned(&mut self, turned: Turned) {
-        self.inverted += turned.count as usize;
-        let widest = f32::from_bits(turned.widest.cast_unsigned());
-        self.narrowest = self.narrowest.min(-f64::from(widest));
+        self.inverted += turned.count;
+        self.narrowest = self.narrowest.min(-f64::from(turned.widest));
     }
 }
 
@@ -78,7 +77,9 @@ pub(super) fn mix_boxes(flakes: &BlendedFlakes, weights: &[[f64; 3]], out: &mut 
     let largest = |axis: usize| weights.iter().map(|w| w[axis].abs()).sum::<f64>();
     let size = largest(0).max(largest(1)).max(largest(2));
     let farthest = size * f64::from(flakes.reach) * ROUNDING;
-    if farthest.is_infinite() || weights.iter().flatten().any(|w| w.abs() > MODERATE) {
+    // Neither an overflow nor a weight of 0 for what is no number is for 32 bits.
+    let overflows = farthest.is_nan() || farthest > f64::from(f32::MAX);
+    if overflows || weights.iter().flatten().any(|w| w.abs() > MODERATE) {
         return wide(&flakes.boxes, weights, out);
     }
     let leaves = farthest > MAX_LAB;
@@ -127,31 +128,24 @@ fn narrow<const PAINTS: usize>(
     // Weights that are not negative keep corners in order, for rounding does.
     let turns = weights.as_flattened().iter().any(|w| *w < 0.0);
     if weights.iter().all(|w| *w == [w[0]; 3]) {
-        let weights = weights.map(|w| w[0]);
-        if turns {
-            make_room(out, paints[0].lower.len());
-        }
-        return blocks(paints, &weights, [leaves, turns], out);
+        return blocks(paints, &weights.map(|w| w[0]), leaves || turns, out);
     }
     let patterns: [[f32; BLOCK]; PAINTS] = weights.map(|axes| std::array::from_fn(|k| axes[k % 3]));
-    make_room(out, paints[0].lower.len());
-    blocks(paints, &patterns, [leaves, turns], out)
+    blocks(paints, &patterns, leaves || turns, out)
 }
 
 fn blocks<const PAINTS: usize>(
     paints: [&Boxes; PAINTS],
     weights: &[impl Weight; PAINTS],
-    [leaves, turns]: [bool; 2],
+    watch: bool,
     out: &mut Boxes,
 ) -> Account {
     let mut account = Account::default();
     let numbers = paints[0].lower.as_flattened().len();
     let mut lists =
         [&mut out.lower, &mut out.upper].map(|list| std::mem::take(list).into_flattened());
-    // Used memory is written over. New memory would have to be cleared first: it is appended to, where one weight is for
-    // all axes and none is negative.
-    let over = lists.iter().all(|list| list.len() == numbers);
-    if !over {
+    // Used memory is written over where both lists are as long as the sums.
+    if lists.iter().any(|list| list.len() != numbers) {
         for list in &mut lists {
             list.clear();
             list.reserve_exact(numbers);
@@ -163,29 +157,21 @@ fn blocks<const PAINTS: usize>(
             paints.map(|own| &own.lower.as_flattened()[here.clone()]),
             paints.map(|own| &own.upper.as_flattened()[here.clone()]),
         ];
-        let beyond = if over {
-            let out = lists.each_mut().map(|list| &mut list[here.clone()]);
-            match (leaves, turns) {
-                (true, true) => {
-                    sums::<PAINTS, true, true>(weights, lower, upper, out, &mut account)
-                }
-                (true, false) => {
-                    sums::<PAINTS, true, false>(weights, lower, upper, out, &mut account)
-                }
-                (false, true) => {
-                    sums::<PAINTS, false, true>(weights, lower, upper, out, &mut account)
-                }
-                (false, false) => {
-                    sums::<PAINTS, false, false>(weights, lower, upper, out, &mut account)
-                }
+        if lists[0].len() < here.end {
+            if !watch {
+                append_sums(weights, lower, upper, &mut lists);
+                continue;
             }
+            // New memory is cleared block by block: the nearest cache holds a block until its sums are there.
+            for list in &mut lists {
+                list.resize(here.end, 0.0);
+            }
+        }
+        let out = lists.each_mut().map(|list| &mut list[here.clone()]);
+        let beyond = if watch {
+            sums::<PAINTS, true>(weights, lower, upper, out, &mut account)
         } else {
-            let weights = weights.each_ref().map(|weight| weight.at(0));
-            if leaves {
-                append_sums::<PAINTS, true>(weights, lower, upper, &mut lists)
-            } else {
-                append_sums::<PAINTS, false>(weights, lower, upper, &mut lists)
-            }
+            sums::<PAINTS, false>(weights, lower, upper, out, &mut account)
         };
         let [low, high] = lists.each_mut().map(|list| &mut list[here.clone()]);
         if beyond {

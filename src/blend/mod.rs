@@ -24,6 +24,7 @@ mod pairs;
 mod parts;
 mod realise;
 mod report;
+mod slice;
 mod thinned;
 mod weights;
 

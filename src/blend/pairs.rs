@@ -12,9 +12,10 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::correspondence::{BlendSettings, Grid, Scratch, SliceBlend};
+use super::BlendError;
+use super::correspondence::{BlendSettings, Grid};
 use super::mixture::clusters_at;
-use super::{BlendError, correspondence};
+use super::slice::{Scratch, SliceBlend};
 use crate::paint::CarPaint;
 use crate::transport::{Cost, Method, Solver};
 
@@ -110,7 +111,7 @@ fn bound_alone(
     Ok(scratch.plan.cost - scratch.plan.gap)
 }
 
-impl correspondence::SliceBlend {
+impl SliceBlend {
     /// Cost of the correspondence between two of its paints.
     fn cost_of_pair(&self, i: usize, j: usize, cost: Cost) -> f64 {
         let center = |(lower, upper): &([f32; 3], [f32; 3])| -> [f64; 3] {
