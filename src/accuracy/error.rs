@@ -16,16 +16,22 @@
 //! The reference profile's transport and files have none of the last three. A realisation outside the paints multiplies
 //! the first two by the sum of the weights' sizes.
 
-use serde::Serialize;
+mod seen;
+#[cfg(test)]
+mod tests;
 
+use serde::Serialize;
+use utoipa::ToSchema;
+
+pub use self::seen::SeenError;
 use super::WritingError;
 use super::writing::bundle_rounding_w1;
-use crate::blend::{Blend, BlendDeviation};
+use crate::blend::Blend;
 use crate::export::ExportSettings;
-use crate::paint::{ASPECULAR_DEG, Clustering, PaintFile};
+use crate::paint::{Clustering, PaintFile};
 
 /// Error of a result against the reference: in Lab, the distance by which its flakes' colors are misplaced.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct ResultError {
     /// Sum of the terms, Lab units; null where one of them is not known.
     pub lab: Option<f64>,
@@ -35,24 +41,9 @@ pub struct ResultError {
     pub seen: Option<SeenError>,
 }
 
-/// What would be noticed of an error: sums of what was measured step by step.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct SeenError {
-    /// Aspecular angles of the instrument geometries, degrees.
-    pub aspecular_deg: [f64; 6],
-    /// CIEDE2000 of the mean color at each.
-    pub delta_e_2000: [f64; 6],
-    /// Relative error of how many flakes are lit at each, fewer than one texel in a thousand counted as that many.
-    pub lit: [f64; 6],
-    /// Relative error of the 99.9th percentile of the flakes' luminance: of clusters nine of ten compared slices are
-    /// within, of transport and file it is the worst geometry.
-    pub sparkle: f64,
-    /// How it is known.
-    pub how: &'static str,
-}
-
 /// One term of an error.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
+#[schema(as = ErrorTerm)]
 pub struct Term {
     /// What it is about: `clusters`, `transport`, `angles`, `rounding`.
     pub what: &'static str,
@@ -101,74 +92,8 @@ impl ResultError {
     }
 }
 
-impl SeenError {
-    /// Of clusters against pixels, and of the angles that were left out since.
-    fn of_clusters(clustering: Option<&Clustering>) -> Option<Self> {
-        let clustering = clustering?;
-        let error = clustering.error.as_ref()?;
-        let of_clusters = Self {
-            aspecular_deg: ASPECULAR_DEG,
-            delta_e_2000: error.instrument,
-            lit: error.lit?,
-            sparkle: error.sparkle.p90,
-            how: SEEN,
-        };
-        if clustering.left_out_w1.is_none() {
-            return Some(of_clusters);
-        }
-        let seen = clustering.left_out_seen?;
-        Some(of_clusters.and(&seen.delta_e_2000, &seen.lit, &seen.sparkle))
-    }
-
-    /// The worse of two, figure by figure.
-    fn or_worse(self, other: Self) -> Self {
-        Self {
-            delta_e_2000: each(self.delta_e_2000, &other.delta_e_2000, f64::max),
-            lit: each(self.lit, &other.lit, f64::max),
-            sparkle: self.sparkle.max(other.sparkle),
-            ..self
-        }
-    }
-
-    /// With what another transport than the exact one adds; that lists nothing.
-    fn and_transport(self, deviations: &[BlendDeviation]) -> Option<Self> {
-        if deviations.is_empty() {
-            return Some(self);
-        }
-        let at = |angle: f64| deviations.iter().find(|own| own.aspecular_deg == angle);
-        let each = self.aspecular_deg.map(at).into_iter();
-        let each = each.collect::<Option<Vec<&BlendDeviation>>>()?;
-        let lit = each.iter().map(|own| own.lit);
-        let lit = lit.collect::<Option<Vec<f64>>>()?;
-        let color: Vec<f64> = each.iter().map(|own| own.delta_e_2000).collect();
-        let sparkle: Vec<f64> = each.iter().map(|own| own.sparkle).collect();
-        Some(self.and(&color, &lit, &sparkle))
-    }
-
-    /// With what another step adds at each geometry.
-    fn and(self, delta_e_2000: &[f64], lit: &[f64], sparkle: &[f64]) -> Self {
-        let sum = |x: f64, y: f64| x + y;
-        Self {
-            delta_e_2000: each(self.delta_e_2000, delta_e_2000, sum),
-            lit: each(self.lit, lit, sum),
-            sparkle: self.sparkle + sparkle.iter().copied().fold(0.0, f64::max),
-            ..self
-        }
-    }
-}
-
-fn each(mut all: [f64; 6], others: &[f64], of: impl Fn(f64, f64) -> f64) -> [f64; 6] {
-    for (own, &other) in all.iter_mut().zip(others) {
-        *own = of(*own, other);
-    }
-    all
-}
-
 /// What the sum of weights' sizes of a mixture may be above 1 by rounding.
 const WITHIN: f64 = 1e-9;
-
-const SEEN: &str = "measured step by step and added up: clusters against pixels, and fewer angles against all, of several paints the \
-                    worst; a blend against exact transport in the same order, at equal weights; a file against the paint";
 
 const CLUSTERS: &str = "measured: W1 of lightness between pixels and clusters, nine of ten of the compared slices are within; \
                         of several paints the worst";
@@ -289,113 +214,5 @@ fn clusters<'a>(of: impl Iterator<Item = Option<&'a Clustering>>) -> Term {
         what: "clusters",
         lab: worst,
         how,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::paint::{ClusteringError, LeftOutSeen, Percentiles};
-
-    fn clustering(color: f64, lit: Option<f64>, sparkle: f64) -> Clustering {
-        let at_p90 = |p90| Percentiles {
-            p90,
-            ..Percentiles::default()
-        };
-        Clustering {
-            clusters: 50,
-            box_rule: "moments".to_owned(),
-            angle_step: 1,
-            w1_bound: None,
-            left_out_w1: None,
-            left_out_seen: None,
-            error: Some(ClusteringError {
-                slices: 20,
-                of: 100,
-                lightness_w1: at_p90(0.3),
-                mean_luminance: Percentiles::default(),
-                sparkle: at_p90(sparkle),
-                instrument: [color; 6],
-                lit: lit.map(|lit| [lit; 6]),
-            }),
-            realised_lab: None,
-        }
-    }
-
-    fn seen(clustering: &Clustering) -> Option<SeenError> {
-        SeenError::of_clusters(Some(clustering))
-    }
-
-    fn deviations(lit: Option<f64>) -> Vec<BlendDeviation> {
-        // In another order than the geometries'.
-        ASPECULAR_DEG
-            .iter()
-            .rev()
-            .map(|&aspecular_deg| BlendDeviation {
-                aspecular_deg,
-                delta_e_2000: aspecular_deg.abs(),
-                sparkle: 0.01,
-                lit,
-            })
-            .collect()
-    }
-
-    #[test]
-    fn what_was_not_measured_is_not_told() {
-        assert!(SeenError::of_clusters(None).is_none());
-        assert!(seen(&clustering(0.1, None, 0.0)).is_none());
-        let thinned = Clustering {
-            left_out_w1: Some(Percentiles::default()),
-            ..clustering(0.1, Some(0.1), 0.0)
-        };
-        assert!(seen(&thinned).is_none());
-        let known = Clustering {
-            left_out_seen: Some(LeftOutSeen {
-                delta_e_2000: [0.5; 6],
-                sparkle: [0.25, 0.125, 0.0, 0.0, 0.0, 0.0],
-                lit: [0.25; 6],
-            }),
-            ..thinned
-        };
-        let known = seen(&known).expect("measured");
-        assert_eq!((known.delta_e_2000, known.sparkle), ([0.6; 6], 0.25));
-        assert_eq!(known.lit, [0.35; 6]);
-        let whole = seen(&clustering(0.1, Some(0.1), 0.0)).expect("measured");
-        assert!(whole.and_transport(&deviations(None)).is_none());
-        assert!(whole.and_transport(&deviations(Some(0.0))[1..]).is_none());
-        assert_eq!(whole.and_transport(&[]), Some(whole));
-    }
-
-    #[test]
-    fn the_worst_paint_counts_and_steps_add_up_geometry_by_geometry() {
-        let first = seen(&clustering(0.1, Some(0.3), 0.02)).expect("measured");
-        let second = seen(&clustering(0.2, Some(0.1), 0.01)).expect("measured");
-        let worse = first.or_worse(second);
-        assert_eq!(
-            (worse.delta_e_2000, worse.lit, worse.sparkle),
-            ([0.2; 6], [0.3; 6], 0.02)
-        );
-        let blended = worse
-            .and_transport(&deviations(Some(0.5)))
-            .expect("measured");
-        assert_eq!(
-            blended.delta_e_2000,
-            ASPECULAR_DEG.map(|angle| 0.2 + angle.abs())
-        );
-        assert_eq!((blended.lit, blended.sparkle), ([0.8; 6], 0.03));
-        let writing = WritingError {
-            rounding_w1: 0.05,
-            instrument: vec![1.0; 6],
-            sparkle: vec![0.0, 0.0, 0.07, 0.0, 0.0, 0.0],
-            lit: vec![0.1; 6],
-            inverse_cdf_loss: None,
-        };
-        let of = ResultError::of(Vec::new(), Some(worse));
-        let file = file_error(&of, Some(&writing));
-        let seen = file.seen.expect("measured");
-        assert_eq!((seen.delta_e_2000, file.lab), ([1.2; 6], Some(0.05)));
-        assert!((seen.lit[3] - 0.4).abs() < 1e-12 && (seen.sparkle - 0.09).abs() < 1e-12);
-        assert!(of.stretched(1.0).seen.is_some() && of.stretched(1.6).seen.is_none());
-        assert!(of.unseen().seen.is_none());
     }
 }

@@ -1,7 +1,8 @@
 //! Accuracy profiles: the settings of all rooms, together.
 //!
-//! `standard` is the knee of the fronts that the study draws (`carpaint study`, docs/study): beyond it, time grows faster
-//! than the error falls. `draft` is for sliders and thumbnails, `reference` is what the others are measured against.
+//! `standard` is the knee of blending in the study that comes with carpaint (`carpaint study`, docs/study): beyond it, a
+//! share of the time buys less than that share of the error. `draft` is for sliders and thumbnails, `reference` is what
+//! the others are measured against.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -36,7 +37,7 @@ impl Default for Profile {
 
 impl Profile {
     /// Fast: few clusters, every second angle, few samples. Transport stays exact: the study finds that greedy transport
-    /// saves little time and misplaces colors by several Lab.
+    /// saves no time.
     #[must_use]
     pub fn draft() -> Self {
         Self {
@@ -50,7 +51,7 @@ impl Profile {
         }
     }
 
-    /// The knee: 50 clusters a slice, exact transport.
+    /// The knee of blending: 50 clusters a slice, exact transport.
     #[must_use]
     pub fn standard() -> Self {
         Self {

@@ -11,6 +11,7 @@ mod samples;
 use std::time::Instant;
 
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::estimate::{Estimate, Work};
 use super::{Format, IngestOptions, WorkshopError, blend_paints, open_paints};
@@ -19,7 +20,8 @@ use crate::paint::PaintFile;
 use ladder::ladder;
 
 /// What a result should keep to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, ToSchema)]
+#[schema(as = AskedTarget)]
 pub struct Target {
     /// Largest error: Lab for flakes, CIEDE2000 for pictures.
     #[serde(skip_serializing_if = "Option::is_none")]

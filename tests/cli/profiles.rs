@@ -141,6 +141,21 @@ fn an_estimate_knows_the_bytes_and_the_error_of_what_then_happens() {
     assert!((stated - lab).abs() < 1e-6, "{stated} {lab}");
 }
 
+/// Samples of paints have other hashes than the paints: their canonical order may be another.
+#[test]
+fn an_estimate_does_not_guess_the_error_of_a_canonical_order() {
+    let desk = Desk::new();
+    let paints = ["sample:bmw339", "sample:ford_f8", "sample:opel_titan"];
+    let error_by = |order: &str| {
+        let knob = format!("order={order}");
+        let words = ["--knob", "clusters=12", "--knob", &knob, "--json"];
+        let asked = [&["estimate", "blend"], &paints[..], &words].concat();
+        json(&desk.ok(&asked).stdout)["error"]["value"].clone()
+    };
+    assert!(error_by("canonical").is_null());
+    assert!(error_by("sampled").as_f64().is_some_and(|lab| lab > 0.0));
+}
+
 /// Files of angles grow more slowly than their pixels, those in linear light as fast.
 #[test]
 fn an_estimate_knows_the_bytes_of_every_picture() {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub enum Preset {
     /// Fast.
     Draft,
-    /// The knee of the fronts.
+    /// The knee of blending.
     #[default]
     Standard,
     /// What the others are measured against.

@@ -110,19 +110,19 @@ impl Front {
     }
 }
 
-/// The point of a falling curve that is farthest below the line between its ends, both axes logarithmic: from there on
-/// time grows faster than the error falls (after Satopää et al., "Finding a kneedle in a haystack", 2011).
+/// The point of a falling curve that is farthest below the line between its ends: from there on a share of the whole time
+/// buys less than that share of the whole error.
+///
+/// Both axes are linear, as in V. Satopää, J. Albrecht, D. Irwin, B. Raghavan, "Finding a 'kneedle' in a haystack", 2011:
+/// errors are in units of what is seen, so that 0.1 less is worth as much from 2 as from 0.2. The ends of the front decide
+/// what the whole is: a coarser or finer setting at one of them moves the knee.
 fn knee(front: &[(f64, f64)]) -> Option<usize> {
     let (first, last) = (front.first()?, front.last()?);
-    let log = |&(t, e): &(f64, f64)| (t.max(1e-9).ln(), e.max(1e-9).ln());
-    let ((t0, e0), (t1, e1)) = (log(first), log(last));
+    let (&(t0, e0), &(t1, e1)) = (first, last);
     if t1 <= t0 || e1 >= e0 {
         return Some(0);
     }
-    let below = |point: &(f64, f64)| {
-        let (t, e) = log(point);
-        (1.0 - (t - t0) / (t1 - t0)) - (e - e1) / (e0 - e1)
-    };
+    let below = |&(t, e): &(f64, f64)| (t1 - t) / (t1 - t0) - (e - e1) / (e0 - e1);
     (0..front.len()).max_by(|&x, &y| below(&front[x]).total_cmp(&below(&front[y])))
 }
 
@@ -163,6 +163,15 @@ mod tests {
         let beaten = &front.points[2];
         let by = front.beaten_by(beaten).map(|point| point.label.as_str());
         assert_eq!((beaten.label.as_str(), by), ("beaten", Some("good")));
+        // On logarithmic axes it would be the third.
+        let steep = [
+            ("a", 1.0, 10.0),
+            ("b", 10.0, 1.0),
+            ("c", 30.0, 0.11),
+            ("d", 100.0, 0.1),
+        ];
+        let steep = steep.map(|(label, seconds, error)| point(label, seconds, error));
+        assert_eq!(Front::new("blend", "", "", "Lab", steep.to_vec()).knee, "b");
         assert!(on.iter().all(|label| {
             let point = front.points.iter().find(|p| p.label == **label);
             point.is_some_and(|point| front.beaten_by(point).is_none())

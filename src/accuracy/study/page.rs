@@ -106,12 +106,14 @@ fn choice(study: &Study) -> String {
         .iter()
         .map(|front| format!("{} {}", front.work, at_knee(front)))
         .collect();
+    let mut fronts = study.fronts.iter();
+    let at_knee_of_blending = fronts.any(|f| f.work == "blend" && f.knee == "standard");
     let (most_of_standard, all) = (most("standard"), study.fronts.len());
     format!(
         "The presets were chosen from such fronts. `standard` is for every day: its errors, {} at most here in Lab or CIEDE2000, {} the \
          {VISIBLE} that a trained eye tells apart side by side; something measured beats it in {} of {all} kinds of work. \
-         The knees, from which on time grows faster than the error falls, are here: {}; they differ from paint to paint \
-         and from one kind of work to another, and `standard` is one profile for all of them. `draft` is for trying out: {} \
+         The knees, from which on a share of the front's time buys less than that share of its error, are here (on linear axes, \
+         those of the plots are logarithmic): {}. {} `draft` is for trying out: {} \
          the time of `standard`, errors up to {}. `reference` is what the others are compared with: {} the time of \
          `standard`, {} its error.\n\n",
         error(most_of_standard),
@@ -122,6 +124,13 @@ fn choice(study: &Study) -> String {
         },
         beaten.count(),
         knees.join(", "),
+        if at_knee_of_blending {
+            "`standard` is one profile for all kinds of work: it is the knee of blending, which is done anew for every pair of paints, \
+             and its files hold both tables that flakes can be drawn by."
+        } else {
+            "They differ from paint to paint and from one kind of work to another; `standard` is one profile for all of them, chosen at \
+             the knee of blending of the study that comes with carpaint."
+        },
         against_standard("draft", |p| p.seconds),
         error(most("draft")),
         against_standard("reference", |p| p.seconds),
@@ -206,13 +215,13 @@ fn verdict(front: &Front) -> String {
     }
     if front.knee == "standard" {
         said.push_str(
-            "- The knee of this front is `standard` itself: beyond it, time grows faster than the error falls. \
-             That is why it is the default.\n",
+            "- The knee of this front is `standard` itself: beyond it, a share of the time buys less than that share of \
+             the error. That is why it is the default.\n",
         );
     } else if !front.knee.is_empty() {
         let _ = writeln!(
             said,
-            "- The knee of this front, from which on time grows faster than the error falls, is {}.",
+            "- The knee of this front, from which on a share of the time buys less than that share of the error, is {}.",
             at_knee(front)
         );
         said.push_str(&beside_knee(front).unwrap_or_default());

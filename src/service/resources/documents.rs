@@ -6,6 +6,7 @@ use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
 
 use super::visibility::Visibility;
+use crate::accuracy::ResultError;
 use crate::service::work::{BlendOptions, TargetDocument};
 use crate::store::{CachedResult, Hash, PaintRecord};
 
@@ -35,7 +36,7 @@ pub struct PaintDocument {
     #[schema(value_type = Option<Object>)]
     pub residuals: Value,
     /// How far its flakes are from the pixels they were made of, Lab, with the terms of it and how each is known.
-    #[schema(value_type = Object)]
+    #[schema(value_type = ResultError)]
     pub error: Value,
     /// How far the paint is from the multi-angle readings that came with its measurement; null where none did.
     #[schema(value_type = Option<Object>)]
@@ -74,7 +75,7 @@ pub struct BlendDocument {
     #[schema(value_type = Object)]
     pub correspondence: Value,
     /// How far its flakes are from the reference, Lab, with the terms of it and how each is known.
-    #[schema(value_type = Object)]
+    #[schema(value_type = ResultError)]
     pub error: Value,
     /// Common angles and the paints' textures; null when no paint has flakes.
     #[schema(value_type = Option<Object>)]

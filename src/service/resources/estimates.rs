@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use axum::extract::State;
 use serde::Serialize;
-use serde_json::Value;
 use utoipa::ToSchema;
 
 pub use self::order::EstimateOrder;
@@ -23,7 +22,7 @@ use crate::service::work::{
     Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, View, WorkshopError,
 };
 use crate::store::LocalBlob;
-use crate::workshop::Environment;
+use crate::workshop::{Environment, EstimatedError, Stage};
 
 /// What a request will take.
 #[derive(Debug, Serialize, ToSchema)]
@@ -35,14 +34,12 @@ pub struct EstimateDocument {
     knobs: Profile,
     /// Wall time on this machine, seconds, under its load of now.
     seconds: f64,
-    /// The same by stage: `stage` and `seconds`.
-    #[schema(value_type = Vec<Object>)]
-    stages: Value,
+    /// The same by stage.
+    stages: Vec<Stage>,
     /// Size of the answer, or of what is kept of it.
     bytes: u64,
-    /// How far the answer is from the reference profile's: `value` and its `unit`, Lab or CIEDE2000.
-    #[schema(value_type = Object)]
-    error: Value,
+    /// How far the answer is from the reference profile's.
+    error: EstimatedError,
     /// Of a target, whether it is met; if not, the estimate is of the best that can be done.
     #[serde(skip_serializing_if = "Option::is_none")]
     met: Option<bool>,
@@ -138,9 +135,9 @@ impl EstimateDocument {
             profile: estimate.profile,
             knobs: estimate.knobs,
             seconds: estimate.seconds,
-            stages: serde_json::to_value(&estimate.stages).unwrap_or_default(),
+            stages: estimate.stages.clone(),
             bytes: estimate.bytes,
-            error: serde_json::to_value(estimate.error).unwrap_or_default(),
+            error: estimate.error,
             met: picked.map(|(met, _)| met),
             searched: picked.map(|(_, seconds)| seconds),
         }

@@ -40,7 +40,6 @@ impl Default for Picks {
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct TargetDocument {
     /// What was asked for: `max_error`, `max_seconds` or both.
-    #[schema(value_type = Object)]
     asked: Target,
     /// Whether it is met. If not, this is the best that could be done.
     met: bool,
@@ -49,8 +48,7 @@ pub struct TargetDocument {
     /// Its knobs.
     #[schema(value_type = Object)]
     knobs: Profile,
-    /// Estimated error: `value` and its `unit`, Lab or CIEDE2000.
-    #[schema(value_type = Object)]
+    /// Estimated error.
     error: EstimatedError,
 }
 

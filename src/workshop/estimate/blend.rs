@@ -6,7 +6,7 @@ use super::{
     write_stage,
 };
 use crate::accuracy::{Profile, blend_error};
-use crate::blend::Blend;
+use crate::blend::{Blend, Order};
 use crate::paint::PaintFile;
 use crate::transport::{Cost, Method};
 use crate::workshop::{IngestOptions, WorkshopError, blend_paints};
@@ -111,9 +111,11 @@ fn of_samples(
     let error = blend_error(&large.1);
     // Clusters were compared on the very slices that they will be compared on; the other terms are of a sample.
     let clusters = error.terms.iter().find(|term| term.what == "clusters");
+    // The canonical order is that of the whole paints' hashes, which samples of them do not have.
+    let joined_alike = sampled.len() < 3 || profile.blend.order != Order::Canonical;
     let error = EstimatedError {
         at_least: clusters.and_then(|term| term.lab),
-        ..EstimatedError::lab(error.lab)
+        ..EstimatedError::lab(error.lab.filter(|_| joined_alike))
     };
     Ok(Estimate::new(profile, stages, bytes, error))
 }

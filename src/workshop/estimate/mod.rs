@@ -19,6 +19,7 @@ mod work;
 use std::time::Instant;
 
 use serde::Serialize;
+use utoipa::ToSchema;
 
 pub use blend::{estimate_blend, estimate_blend_of};
 pub use ingest::{estimate_ingest, sample_to_estimate};
@@ -47,7 +48,8 @@ pub struct Estimate {
 }
 
 /// Time of one stage.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
+#[schema(as = EstimatedStage)]
 pub struct Stage {
     /// What is done.
     pub stage: &'static str,
@@ -56,9 +58,10 @@ pub struct Stage {
 }
 
 /// An error to expect.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
 pub struct EstimatedError {
-    /// How much; null where it is not known, as of a paint that was not clustered here.
+    /// How much; null where it is not known, as of a paint that was not clustered here, or of three and more paints in the
+    /// canonical order.
     pub value: Option<f64>,
     /// Of what: `Lab` (misplaced colors of flakes) or `CIEDE2000` (mean over a picture's pixels, by sampling).
     pub unit: &'static str,

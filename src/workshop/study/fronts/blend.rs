@@ -68,6 +68,7 @@ pub(in crate::workshop::study) fn blend(
         ("squared distance", Method::Exact, Cost::SquaredDistance),
         ("Sinkhorn 0.1", sinkhorn(0.1), Cost::Distance),
         ("Sinkhorn 0.02", sinkhorn(0.02), Cost::Distance),
+        ("Sinkhorn 0.01", sinkhorn(0.01), Cost::Distance),
     ] {
         settings.push(setting(
             label,

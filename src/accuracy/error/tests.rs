@@ -1,0 +1,107 @@
+//! Sums of errors, on figures made by hand.
+
+use super::*;
+use crate::blend::BlendDeviation;
+use crate::paint::{ASPECULAR_DEG, ClusteringError, LeftOutSeen, Percentiles};
+
+fn clustering(color: f64, lit: Option<f64>, sparkle: f64) -> Clustering {
+    let at_p90 = |p90| Percentiles {
+        p90,
+        ..Percentiles::default()
+    };
+    Clustering {
+        clusters: 50,
+        box_rule: "moments".to_owned(),
+        angle_step: 1,
+        w1_bound: None,
+        left_out_w1: None,
+        left_out_seen: None,
+        error: Some(ClusteringError {
+            slices: 20,
+            of: 100,
+            lightness_w1: at_p90(0.3),
+            mean_luminance: Percentiles::default(),
+            sparkle: at_p90(sparkle),
+            instrument: [color; 6],
+            lit: lit.map(|lit| [lit; 6]),
+        }),
+        realised_lab: None,
+    }
+}
+
+fn seen(clustering: &Clustering) -> Option<SeenError> {
+    SeenError::of_clusters(Some(clustering))
+}
+
+fn deviations(lit: Option<f64>) -> Vec<BlendDeviation> {
+    // In another order than the geometries'.
+    ASPECULAR_DEG
+        .iter()
+        .rev()
+        .map(|&aspecular_deg| BlendDeviation {
+            aspecular_deg,
+            delta_e_2000: aspecular_deg.abs(),
+            sparkle: 0.01,
+            lit,
+        })
+        .collect()
+}
+
+#[test]
+fn what_was_not_measured_is_not_told() {
+    assert!(SeenError::of_clusters(None).is_none());
+    assert!(seen(&clustering(0.1, None, 0.0)).is_none());
+    let thinned = Clustering {
+        left_out_w1: Some(Percentiles::default()),
+        ..clustering(0.1, Some(0.1), 0.0)
+    };
+    assert!(seen(&thinned).is_none());
+    let known = Clustering {
+        left_out_seen: Some(LeftOutSeen {
+            delta_e_2000: [0.5; 6],
+            sparkle: [0.25, 0.125, 0.0, 0.0, 0.0, 0.0],
+            lit: [0.25; 6],
+        }),
+        ..thinned
+    };
+    let known = seen(&known).expect("measured");
+    assert_eq!((known.delta_e_2000, known.sparkle), ([0.6; 6], 0.25));
+    assert_eq!(known.lit, [0.35; 6]);
+    let whole = seen(&clustering(0.1, Some(0.1), 0.0)).expect("measured");
+    assert!(whole.and_transport(&deviations(None)).is_none());
+    assert!(whole.and_transport(&deviations(Some(0.0))[1..]).is_none());
+    assert_eq!(whole.and_transport(&[]), Some(whole));
+}
+
+#[test]
+fn the_worst_paint_counts_and_steps_add_up_geometry_by_geometry() {
+    let first = seen(&clustering(0.1, Some(0.3), 0.02)).expect("measured");
+    let second = seen(&clustering(0.2, Some(0.1), 0.01)).expect("measured");
+    let worse = first.or_worse(second);
+    assert_eq!(
+        (worse.delta_e_2000, worse.lit, worse.sparkle),
+        ([0.2; 6], [0.3; 6], 0.02)
+    );
+    let blended = worse
+        .and_transport(&deviations(Some(0.5)))
+        .expect("measured");
+    assert_eq!(
+        blended.delta_e_2000,
+        ASPECULAR_DEG.map(|angle| 0.2 + angle.abs())
+    );
+    assert_eq!((blended.lit, blended.sparkle), ([0.8; 6], 0.03));
+    let writing = WritingError {
+        rounding_w1: 0.05,
+        instrument: vec![1.0; 6],
+        sparkle: vec![0.0, 0.0, 0.07, 0.0, 0.0, 0.0],
+        lit: vec![0.1; 6],
+        inverse_cdf_loss: None,
+    };
+    let of = ResultError::of(Vec::new(), Some(worse));
+    let file = file_error(&of, Some(&writing));
+    let seen = file.seen.expect("measured");
+    assert_eq!((seen.delta_e_2000, file.lab), ([1.2; 6], Some(0.05)));
+    assert!((seen.lit[3] - 0.4).abs() < 1e-12 && (seen.sparkle - 0.09).abs() < 1e-12);
+    assert!(of.stretched(1.0).seen.is_some() && of.stretched(1.6).seen.is_none());
+    assert!(of.unseen().seen.is_none());
+}
