@@ -45,14 +45,15 @@ impl Blend {
             );
             return Err(WorkshopError::usage("INPUT", problem));
         }
+        let mut stages = Laps::begin();
         let picked = self.target.pick(&Work::BlendNames {
             names: &self.inputs,
             options: &options,
         })?;
         if let Some(picked) = &picked {
             options.profile = *picked.profile();
+            stages.end("search");
         }
-        let mut stages = Laps::begin();
         let progress = Progress::reading(&self.inputs.join(", "));
         let paints = open_paints(&self.inputs, &options, &|share| progress.at(share))?;
         drop(progress);

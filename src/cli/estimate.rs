@@ -1,12 +1,12 @@
 //! `carpaint estimate`: what a command will take, before it is run.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{Args, Subcommand, ValueEnum};
 use serde_json::json;
 
-use super::ingest::ReadingArgs;
+use super::ingest::{ReadingArgs, measurement};
 use super::number::whole;
 use super::output;
 use super::preview::{FrameArgs, ShowName, refuse_samples_of_angles};
@@ -180,7 +180,7 @@ impl Estimate {
         };
         match &self.work {
             What::Ingest { input, .. } => of(&Work::Ingest {
-                path: Path::new(input),
+                path: &measurement(input)?,
                 options,
             }),
             What::Blend { inputs, .. } => of(&Work::BlendNames {

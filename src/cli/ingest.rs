@@ -14,6 +14,7 @@ use super::{output, show};
 use crate::measurement::{Layout, ReadOptions, ThetaHSpacing};
 use crate::workshop::{
     IngestOptions, Laps, Source, Work, WorkshopError, describe_paint, find, ingest_in_stages,
+    is_paint_file,
 };
 
 const A_CSV: &str = "\
@@ -125,10 +126,28 @@ impl ReadingArgs {
                 header_bytes: self.header_bytes,
             },
             coat_ior: self.coat_ior,
-            clusters: profile.asked_clusters()?,
+            asked: profile.knobs()?,
             profile: profile.profile()?,
             ..IngestOptions::default()
         })
+    }
+}
+
+/// Where a measurement is; what is none already is refused.
+pub fn measurement(name: &str) -> Result<PathBuf, WorkshopError> {
+    match find(name)? {
+        Source::Path(path) if is_paint_file(&path)? => {
+            let hint = "this is a .paint: nothing of it is left to ingest";
+            Err(WorkshopError::input(name, hint))
+        }
+        Source::Path(path) => Ok(path),
+        Source::Sample(sample) => {
+            let hint = format!(
+                "a sample is no measurement; 'carpaint samples export {}' writes its .paint",
+                sample.name
+            );
+            Err(WorkshopError::input(name, hint))
+        }
     }
 }
 
@@ -138,27 +157,19 @@ impl Ingest {
         let mut options = self
             .reading
             .options(self.name.clone(), &self.target.profile)?;
-        let path = match find(&self.input)? {
-            Source::Path(path) => path,
-            Source::Sample(sample) => {
-                let hint = format!(
-                    "a sample is no measurement; 'carpaint samples export {}' writes its .paint",
-                    sample.name
-                );
-                return Err(WorkshopError::input(&self.input, hint));
-            }
-        };
+        let path = measurement(&self.input)?;
         let work = Work::Ingest {
             path: &path,
             options: &options,
         };
+        let stages = RefCell::new(Laps::begin());
+        let ended = |stage| stages.borrow_mut().end(stage);
         let picked = self.target.pick(&work)?;
         if let Some(picked) = &picked {
             options.profile = *picked.profile();
+            ended("search");
         }
         let progress = Progress::new("ingesting");
-        let stages = RefCell::new(Laps::begin());
-        let ended = |stage| stages.borrow_mut().end(stage);
         let paint = ingest_in_stages(&path, &options, &|share| progress.at(share), &ended)?;
         output::replace(&self.out, &paint.to_bytes()?)?;
         ended("write");

@@ -35,7 +35,8 @@ pub struct ProfileArgs {
 pub struct TargetArgs {
     #[command(flatten)]
     pub profile: ProfileArgs,
-    /// In place of a profile: the cheapest whose error is at most this, Lab for flakes, CIEDE2000 for pictures.
+    /// In place of a profile: the cheapest whose error is at most this; for flakes in Lab, for pictures what their samples
+    /// leave to chance, in CIEDE2000.
     #[arg(long, value_name = "E", value_parser = above_zero, allow_hyphen_values = true,
         conflicts_with_all = ["profile", "knobs", "clusters"])]
     pub max_error: Option<f64>,
@@ -77,11 +78,6 @@ impl ProfileArgs {
         self.knobs()?
             .profile()
             .map_err(|e| WorkshopError::usage("--profile", e))
-    }
-
-    /// Clusters asked for by number.
-    pub fn asked_clusters(&self) -> Result<Option<usize>, WorkshopError> {
-        Ok(self.knobs()?.clusters.map(|n| n as usize))
     }
 }
 

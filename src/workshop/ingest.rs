@@ -13,7 +13,7 @@ use self::readings::ingest_readings;
 use super::content::content_hash;
 use super::thing::first_bytes;
 use super::{WorkshopError, read};
-use crate::accuracy::Profile;
+use crate::accuracy::{Knobs, Profile};
 use crate::measurement::{Layout, ReadOptions};
 use crate::paint::{Limits, PaintFile, certify};
 
@@ -29,8 +29,8 @@ pub struct IngestOptions {
     pub read: ReadOptions,
     /// Index of refraction of the coat, where the caller knows it.
     pub coat_ior: Option<f64>,
-    /// Clusters the caller asked for by number.
-    pub clusters: Option<usize>,
+    /// Knobs the caller turned by name: they are part of `profile`, and refused by what was made otherwise.
+    pub asked: Knobs,
     /// Accuracy.
     pub profile: Profile,
     /// Limits on what is read.
@@ -61,8 +61,10 @@ impl IngestOptions {
         name: &str,
         paint: &PaintFile,
     ) -> Result<(), WorkshopError> {
-        self.clusters
-            .map_or(Ok(()), |wanted| check_clusters(name, paint, wanted))
+        let wanted = self.asked.clusters;
+        wanted.map_or(Ok(()), |wanted| {
+            check_clusters(name, paint, wanted as usize)
+        })
     }
 }
 

@@ -20,6 +20,7 @@ mod reading;
 mod realising;
 mod samples;
 mod selftest;
+mod settled;
 mod study;
 mod target;
 mod thing;
@@ -46,6 +47,7 @@ pub use reading::{MOST_ANGLES, color_difference, gloss, readings, readings_docum
 pub use realising::{Format, Made, realise};
 pub use samples::{SAMPLES, Sample, by_name as sample_by_name};
 pub use selftest::{Check, selftest};
+pub use settled::{Settled, settled};
 pub use study::{StudyOptions, study};
 pub use target::{Picked, Target};
 pub use thing::{Source, Thing, find, open, open_paint, open_paints, read};

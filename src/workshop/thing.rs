@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use rayon::prelude::*;
 
 use super::ingest::{IngestOptions, ingest};
+use super::settled::refuse_settled;
 use super::{WorkshopError, samples};
 use crate::blend::{Blend, RealisationWeights, Realised};
 use crate::paint::{Limits, PaintFile};
@@ -120,7 +121,7 @@ pub fn open_paint(
     options: &IngestOptions,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<PaintFile, WorkshopError> {
-    match open(name, options, progress)? {
+    match open_any(name, options, progress)? {
         Thing::Paint(paint) => Ok(*paint),
         Thing::Blend(_) => {
             let problem =
@@ -154,12 +155,22 @@ pub fn open_paints(
     opened.into_iter().collect()
 }
 
-/// Whatever the name means; measurements are ingested.
+/// Whatever the name means, to make something of it as it is; measurements are ingested.
 ///
 /// # Errors
 ///
-/// [`WorkshopError`] for a name that is nothing or a damaged file.
+/// [`WorkshopError`] for a name that is nothing, a damaged file, or what was made by other knobs than asked for.
 pub fn open(
+    name: &str,
+    options: &IngestOptions,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Thing, WorkshopError> {
+    let thing = open_any(name, options, progress)?;
+    refuse_settled(name, &thing, &options.asked)?;
+    Ok(thing)
+}
+
+fn open_any(
     name: &str,
     options: &IngestOptions,
     progress: &(dyn Fn(f32) + Sync),
@@ -177,7 +188,7 @@ pub fn open(
         let bytes = read(&path, &options.limits)?;
         let blend = Blend::from_bytes(&bytes, &options.limits)
             .map_err(|e| WorkshopError::input(name, e))?;
-        if let Some(clusters) = options.clusters {
+        if let Some(clusters) = options.asked.clusters {
             let problem = format!(
                 "{name} is a blend, its clusters correspond already: blend its paints again with --clusters {clusters}, \
                  or leave it out"

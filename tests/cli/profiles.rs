@@ -141,6 +141,31 @@ fn an_estimate_knows_the_bytes_and_the_error_of_what_then_happens() {
     assert!((stated - lab).abs() < 1e-6, "{stated} {lab}");
 }
 
+/// How a blend was made is not changed by what is made of it: who asks for that is told, and not answered with something
+/// else.
+#[test]
+fn a_settled_knob_is_refused_with_its_value_and_that_value_is_not() {
+    let desk = Desk::new();
+    let blend = "blend sample:bmw339 sample:ford_f8 --profile draft --out d.blend";
+    desk.ok(&blend.split(' ').collect::<Vec<_>>());
+    let realise = "realise d.blend --weights 0.5,0.5 --out x.json";
+    let realise: Vec<&str> = realise.split(' ').collect();
+    for (asked, made) in [
+        ("transport=greedy", "transport=exact"),
+        ("cost=squared", "cost=distance"),
+        ("angle_step=1", "angle_step=2"),
+        ("box_rule=tight", "box_rule=moments"),
+    ] {
+        let refused = desk.refused(2, &[&realise[..], &["--knob", asked]].concat());
+        assert!(refused.contains(made), "{asked}: {refused}");
+    }
+    let same = "transport=exact,cost=distance,angle_step=2,box_rule=moments,order=cheapest";
+    let same = same.split(',').flat_map(|knob| ["--knob", knob]);
+    desk.ok(&realise.iter().copied().chain(same).collect::<Vec<_>>());
+    // A preset is a whole: as much of it is taken as there is left to choose.
+    desk.ok(&[&realise[..], &["--profile", "reference"]].concat());
+}
+
 /// Samples of paints have other hashes than the paints: their canonical order may be another.
 #[test]
 fn an_estimate_does_not_guess_the_error_of_a_canonical_order() {

@@ -112,6 +112,32 @@ async fn profiles_are_names_or_knobs_and_targets_are_answered_with_what_was_pick
         .problem(422, "invalid-value");
     assert_eq!(problem["pointer"], "/paint");
 
+    // How the blend was made is not changed by what is made of it.
+    let id = by_name.json()["id"].as_str().expect("an id").to_owned();
+    let written = |cost: &str| {
+        let path = format!("/v1/blends/{id}/realisation.zip?weights=0.5,0.5&profile=cost={cost}");
+        let house = &house;
+        async move { house.get(&path).await }
+    };
+    assert_eq!(written("distance").await.status, 200);
+    let settled = written("squared").await;
+    let settled = settled.problem(400, "invalid-parameter");
+    assert_eq!(
+        (&settled["pointer"], &settled["accepted"]),
+        (
+            &json!("/profile"),
+            &json!("cost=distance, or a profile without cost")
+        )
+    );
+    let estimate = json!({ "work": "realise", "blend": id, "profile": { "cost": "squared" } });
+    let estimate = house
+        .post_json("/v1/estimates", &estimate.to_string())
+        .await;
+    assert_eq!(
+        estimate.problem(422, "invalid-value")["pointer"],
+        "/profile"
+    );
+
     let shipped = house.get("/v1/accuracy").await;
     assert_eq!(shipped.json()["format"], "carpaint study");
     assert_eq!(shipped.header("carpaint-study"), Some("shipped"));

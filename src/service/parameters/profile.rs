@@ -8,7 +8,7 @@ use crate::paint::Clustering;
 use crate::service::http::Problem;
 use crate::service::shelf::Shelved;
 use crate::service::work::Thing;
-use crate::workshop::check_clusters;
+use crate::workshop::{Settled, check_clusters, settled};
 
 /// What would be accepted in place of a profile that is none.
 const ACCEPTED: &str =
@@ -38,7 +38,8 @@ pub enum ProfileDocument {
     Knobs(KnobsDocument),
 }
 
-/// Knobs of a profile. What is left out stays as the preset has it.
+/// Knobs of a profile. What is left out stays as the preset has it. Of a paint or a blend that is there, a knob by which
+/// it was made otherwise is refused: it is not made anew.
 #[derive(Debug, Serialize, ToSchema)]
 #[allow(dead_code)] // says what is accepted
 pub struct KnobsDocument {
@@ -97,12 +98,27 @@ impl ProfileText {
         })
     }
 
-    /// Refuses clusters that a paint or a blend does not have: paints are clustered when they are uploaded.
+    /// Refuses knobs that a paint or a blend was made by otherwise, to make something of it as it is.
     ///
     /// # Errors
     ///
     /// [`Problem`] that names the parameter.
     pub fn fits(&self, thing: &Shelved) -> Result<(), Problem> {
+        self.fits_clusters(thing)?;
+        let Some(Settled { knob, made, asked }) = settled(&thing.thing, &self.0) else {
+            return Ok(());
+        };
+        let detail = format!("{} was made with {knob}={made}, not {asked}.", thing.id);
+        let accepted = format!("{knob}={made}, or a profile without {knob}");
+        Err(Problem::parameter("profile", detail).accepting(accepted))
+    }
+
+    /// Refuses clusters that a paint or a blend does not have: paints are clustered when they are uploaded.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] that names the parameter.
+    pub fn fits_clusters(&self, thing: &Shelved) -> Result<(), Problem> {
         let Some(wanted) = self.0.clusters else {
             return Ok(());
         };

@@ -91,7 +91,12 @@ pub async fn create(
     let needed = Needed::of(&order, &app, &profile).await?;
     if let Some(asked) = &order.profile {
         for thing in needed.things() {
-            asked.fits(thing).map_err(Problem::in_body)?;
+            let fits = match needed {
+                // A blend may leave out angles of its paints.
+                Needed::Blend(_) => asked.fits_clusters(thing),
+                _ => asked.fits(thing),
+            };
+            fits.map_err(Problem::in_body)?;
         }
     }
     let works = Arc::clone(&app.works);

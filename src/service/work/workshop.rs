@@ -8,7 +8,7 @@ use super::works::{
     Asked, Estimate, Format, Gloss, IngestOrder, Made, Picked, Picture, PictureFormat, Progress,
     Readings, Target, Thing, View, Works,
 };
-use crate::accuracy::Profile;
+use crate::accuracy::{Knobs, Profile};
 use crate::blend::{Blend, RealisationWeights};
 use crate::measurement::ReadOptions;
 use crate::paint::{Limits, PaintFile};
@@ -40,7 +40,10 @@ impl Workshop {
                 header_bytes: order.header_bytes,
             },
             coat_ior: order.coat_ior,
-            clusters: order.clusters.map(|n| n as usize),
+            asked: Knobs {
+                clusters: order.clusters,
+                ..Knobs::default()
+            },
             profile: order.profile,
             limits: self.limits,
         }
