@@ -13,7 +13,7 @@ use crate::paint::Provenance;
 ///
 /// # Errors
 ///
-/// [`WorkshopError`] for a single paint, which has nothing to mix, or an export that fails.
+/// [`WorkshopError`] for a single paint, which has nothing to mix, a profile without alias tables, or an export that fails.
 pub fn bundle_blend(thing: &Thing, profile: &Profile) -> Result<Made, WorkshopError> {
     match thing {
         Thing::Blend(blend) => of_blend(blend, profile),
@@ -28,6 +28,11 @@ pub fn bundle_blend(thing: &Thing, profile: &Profile) -> Result<Made, WorkshopEr
 }
 
 fn of_blend(blend: &Blend, profile: &Profile) -> Result<Made, WorkshopError> {
+    if !profile.export.alias {
+        let problem = "draw is inverse_cdf, which is of one realisation: the bundle of a blend draws by alias tables, \
+                       accepted is alias or both";
+        return Err(WorkshopError::usage("profile", problem));
+    }
     let mut laps = Laps::begin();
     let (names, hashes): (Vec<&str>, Vec<&str>) = blend.ingredients().unzip();
     let report = json!({

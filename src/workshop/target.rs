@@ -23,7 +23,7 @@ use ladder::ladder;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, ToSchema)]
 #[schema(as = AskedTarget)]
 pub struct Target {
-    /// Largest error: Lab for flakes, CIEDE2000 for pictures.
+    /// Largest error: for flakes in Lab, for pictures what their samples leave to chance, in CIEDE2000.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_error: Option<f64>,
     /// Longest time, seconds: of the search for a profile and of the work with it.

@@ -25,10 +25,10 @@ pub fn estimate_blend(
         .iter()
         .map(|name| sample(name, options, sizes))
         .collect::<Result<Vec<_>, _>>()?;
-    of_samples(&sampled, &options.profile, true)
+    of_samples(&sampled, &options.profile)
 }
 
-/// The same of paints that are there already; the blend is not written to a file of its own.
+/// The same of paints that are there already.
 ///
 /// # Errors
 ///
@@ -42,7 +42,7 @@ pub fn estimate_blend_of(
         .iter()
         .map(|&paint| of_paint(paint.clone(), profile, sizes, 0.0))
         .collect();
-    of_samples(&sampled, profile, false)
+    of_samples(&sampled, profile)
 }
 
 /// Angles of the samples. Where a blend is compared with what each pair could have alone, or with exact transport, that
@@ -59,11 +59,7 @@ fn sizes(paints: usize, profile: &Profile) -> Sizes {
 /// Angles of samples of more slices than are compared.
 const MANY_ANGLES: Sizes = [9, 14];
 
-fn of_samples(
-    sampled: &[Sampled],
-    profile: &Profile,
-    written: bool,
-) -> Result<Estimate, WorkshopError> {
+fn of_samples(sampled: &[Sampled], profile: &Profile) -> Result<Estimate, WorkshopError> {
     let go = |which: usize| -> Result<(f64, Blend), WorkshopError> {
         let paints: Vec<&PaintFile> = sampled.iter().map(|s| &s.paints[which]).collect();
         let (seconds, made) = shortest(|| blend_paints(&paints, profile, &|_| ()));
@@ -101,13 +97,11 @@ fn of_samples(
         stage: "blend",
         seconds: at(small.0, large.0) + sampled.iter().map(|s| s.thinning).sum::<f64>(),
     });
-    if written {
-        stages.push(Stage {
-            stage: "encode",
-            seconds: at(encode_small, encode_large),
-        });
-        stages.extend(write_stage(bytes));
-    }
+    stages.push(Stage {
+        stage: "encode",
+        seconds: at(encode_small, encode_large),
+    });
+    stages.extend(write_stage(bytes));
     let error = blend_error(&large.1);
     // Clusters were compared on the very slices that they will be compared on; the other terms are of a sample.
     let clusters = error.terms.iter().find(|term| term.what == "clusters");

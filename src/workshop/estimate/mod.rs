@@ -63,7 +63,8 @@ pub struct EstimatedError {
     /// How much; null where it is not known, as of a paint that was not clustered here, or of three and more paints in the
     /// canonical order.
     pub value: Option<f64>,
-    /// Of what: `Lab` (misplaced colors of flakes) or `CIEDE2000` (mean over a picture's pixels, by sampling).
+    /// Of what: `Lab`, misplaced colors of flakes; or `CIEDE2000`, what a picture's samples leave to chance, mean over its
+    /// pixels. How far off the paint in the picture is, the paint tells itself.
     pub unit: &'static str,
     /// What it will be at least, in the same unit, where `value` is of a sample and a part of it is known already as it
     /// will be measured.

@@ -44,9 +44,30 @@ struct SmallPicture {
     stages: Vec<Lap>,
 }
 
+/// Work, pixels times batches of samples, up to which a picture is drawn itself to tell what it takes: no more than its
+/// samples may come to.
+const LITTLE: f64 = 160.0 * 160.0 * 2.0;
+
 /// Samples come in batches: up to one a pixel takes about the same.
 fn batches(samples_per_pixel: u32) -> f64 {
     f64::from(samples_per_pixel.div_ceil(ENOUGH))
+}
+
+impl SmallPicture {
+    fn of(
+        options: &PreviewOptions,
+        (seconds, made): (f64, Result<Made, WorkshopError>),
+    ) -> Result<Self, WorkshopError> {
+        let made = made?;
+        let pixels = options.size.map(f64::from).iter().product();
+        Ok(Self {
+            work: pixels * batches(options.samples_per_pixel),
+            seconds,
+            pixels,
+            bytes: made.bytes.len() as f64,
+            stages: made.stages,
+        })
+    }
 }
 
 impl SmallPictures {
@@ -148,17 +169,17 @@ impl SmallPictures {
                 size,
                 ..work.with(samples_per_pixel)
             };
-            let samples = of.samples_per_pixel;
-            let (seconds, made) = time(of);
-            let made = made?;
-            drawn.push(SmallPicture {
-                work: pixels * batches(samples),
-                seconds,
-                pixels,
-                bytes: made.bytes.len() as f64,
-                stages: made.stages,
-            });
+            drawn.push(SmallPicture::of(&of, time(of.clone()))?);
         }
+        Ok(Self { drawn })
+    }
+
+    /// One picture, which is the whole of the work.
+    fn of(
+        options: &PreviewOptions,
+        timed: (f64, Result<Made, WorkshopError>),
+    ) -> Result<Self, WorkshopError> {
+        let drawn = vec![SmallPicture::of(options, timed)?];
         Ok(Self { drawn })
     }
 
@@ -243,7 +264,11 @@ pub fn estimate_preview(
 ) -> Result<Estimate, WorkshopError> {
     let samples = work.with(profile.samples_per_pixel).samples_per_pixel;
     let few = samples.min(2 * ENOUGH);
-    let small = if work.options.show.is_paint() {
+    let itself = work.with(samples);
+    let [across, down] = itself.size.map(f64::from);
+    let small = if across * down * batches(samples) <= LITTLE {
+        SmallPictures::of(&itself, timed(|| work.draw(&itself)))?
+    } else if work.options.show.is_paint() {
         SmallPictures::draw(work, few, &SIDES, |of| shortest(|| work.draw(&of)))?
     } else {
         SmallPictures::draw(work, 1, &SIDES_OF_ANGLES, |of| timed(|| work.draw(&of)))?

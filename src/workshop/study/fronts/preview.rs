@@ -95,7 +95,7 @@ pub(in crate::workshop::study) fn preview(
     let error_is = format!(
         "The error is the mean CIEDE2000 over all pixels from a picture with {finest} samples a pixel by the `reference` \
          profile. Beside it stand the difference that 95 % of the pixels keep within, and FLIP (0 to 1). A larger \
-         picture shows finer flakes and is farther off at the same samples, and its time grows nearly as its pixels: \
+         picture shows finer flakes and is farther off at the same samples, and it takes longer: \
          `carpaint estimate preview` tells both for yours."
     );
     Ok(Front::new(
