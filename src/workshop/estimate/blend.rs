@@ -2,8 +2,8 @@
 
 use super::ingest::{Sampled, of_paint, sample};
 use super::{
-    COLD, Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, shortest, timed,
-    write_stage,
+    COLD, Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, shortest, this_machine,
+    timed, write_stage,
 };
 use crate::accuracy::{Profile, blend_error};
 use crate::blend::{Blend, Order};
@@ -25,10 +25,10 @@ pub fn estimate_blend(
         .iter()
         .map(|name| sample(name, options, sizes))
         .collect::<Result<Vec<_>, _>>()?;
-    of_samples(&sampled, &options.profile)
+    of_samples(&sampled, &options.profile, Kept::InFile)
 }
 
-/// The same of paints that are there already.
+/// The same of paints that are there already, for a store that keeps the blend.
 ///
 /// # Errors
 ///
@@ -42,7 +42,7 @@ pub fn estimate_blend_of(
         .iter()
         .map(|&paint| of_paint(paint.clone(), profile, sizes, 0.0))
         .collect();
-    of_samples(&sampled, profile)
+    of_samples(&sampled, profile, Kept::InStore)
 }
 
 /// Angles of the samples. Where a blend is compared with what each pair could have alone, or with exact transport, that
@@ -59,7 +59,22 @@ fn sizes(paints: usize, profile: &Profile) -> Sizes {
 /// Angles of samples of more slices than are compared.
 const MANY_ANGLES: Sizes = [9, 14];
 
-fn of_samples(sampled: &[Sampled], profile: &Profile) -> Result<Estimate, WorkshopError> {
+/// Where a blend goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kept {
+    InFile,
+    /// Its catalogue is written to [`COMMITS`] times: when a job is queued, taken up and done.
+    InStore,
+}
+
+/// Times that keeping a blend in a store writes as much as a file's end takes.
+const COMMITS: f64 = 3.0;
+
+fn of_samples(
+    sampled: &[Sampled],
+    profile: &Profile,
+    kept: Kept,
+) -> Result<Estimate, WorkshopError> {
     let go = |which: usize| -> Result<(f64, Blend), WorkshopError> {
         let paints: Vec<&PaintFile> = sampled.iter().map(|s| &s.paints[which]).collect();
         let (seconds, made) = shortest(|| blend_paints(&paints, profile, &|_| ()));
@@ -97,11 +112,21 @@ fn of_samples(sampled: &[Sampled], profile: &Profile) -> Result<Estimate, Worksh
         stage: "blend",
         seconds: at(small.0, large.0) + sampled.iter().map(|s| s.thinning).sum::<f64>(),
     });
-    stages.push(Stage {
-        stage: "encode",
-        seconds: at(encode_small, encode_large),
-    });
-    stages.extend(write_stage(bytes));
+    let encode = at(encode_small, encode_large);
+    let write = |bytes| this_machine().write_seconds(bytes).unwrap_or(0.0);
+    match kept {
+        Kept::InFile => {
+            stages.push(Stage {
+                stage: "encode",
+                seconds: encode,
+            });
+            stages.extend(write_stage(bytes));
+        }
+        Kept::InStore => stages.push(Stage {
+            stage: "store",
+            seconds: encode + write(bytes) + COMMITS * write(0.0),
+        }),
+    }
     let error = blend_error(&large.1);
     // Clusters were compared on the very slices that they will be compared on; the other terms are of a sample.
     let clusters = error.terms.iter().find(|term| term.what == "clusters");
