@@ -1,8 +1,9 @@
 //! The basis of the transportation simplex: a spanning tree over sources and targets.
 //!
 //! Each point knows its parent, the flow on the edge to it, and the set of targets below it as bits. The sets make a pivot
-//! short: whether a point is above a target is one bit, above a source it is its parent's bit, and the part of the tree that swings over is one set, whose values
-//! move eight at a time. Sources are in no set: a source's value follows from its parent's.
+//! short: whether a point is above a target is one bit, above a source it is its parent's bit, and the part of the tree
+//! that swings over is one set, whose values move eight at a time. Sources are in no set: a source's value follows from
+//! its parent's.
 
 use super::cost::LANES;
 use super::start::Closing;

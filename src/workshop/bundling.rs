@@ -29,8 +29,8 @@ pub fn bundle_blend(thing: &Thing, profile: &Profile) -> Result<Made, WorkshopEr
 
 fn of_blend(blend: &Blend, profile: &Profile) -> Result<Made, WorkshopError> {
     if !profile.export.alias {
-        let problem = "draw is inverse_cdf, which is of one realisation: the bundle of a blend draws by alias tables, \
-                       accepted is alias or both";
+        let problem = "draw=inverse_cdf is of one realisation: the bundle of a blend draws by alias tables, \
+                       accepted is draw=alias or draw=both";
         return Err(WorkshopError::usage("profile", problem));
     }
     let mut laps = Laps::begin();

@@ -4,7 +4,8 @@
 //! Functions here are synchronous and compute; they read the files they are told to read, and give bytes to whoever keeps
 //! them. Estimates and the study look at a clock, and write a file of no name to learn what writing takes; what was made
 //! tells beside itself how long its stages took. No bytes depend on a clock, but for the profile that is picked for a time.
-//! Long work takes a function that hears the share done. Every failure is a [`WorkshopError`] that says whose fault it is.
+//! Long work takes a function that hears the share done. Knobs by which a paint or a blend was made are not turned
+//! afterwards: [`settled`] says which. Every failure is a [`WorkshopError`] that says whose fault it is.
 
 mod blending;
 mod bundling;

@@ -166,6 +166,25 @@ fn a_settled_knob_is_refused_with_its_value_and_that_value_is_not() {
     desk.ok(&[&realise[..], &["--profile", "reference"]].concat());
 }
 
+#[test]
+fn what_cannot_be_made_is_refused_and_a_small_picture_is_estimated_by_drawing_it() {
+    let desk = Desk::with_blend();
+    let steps = "bundle b.blend --knob draw=inverse_cdf --out x.zip";
+    let refused = desk.refused(2, &steps.split(' ').collect::<Vec<_>>());
+    assert!(refused.contains("draw=alias or draw=both"), "{refused}");
+    desk.ok(&["samples", "export", "white", "--out", "white.paint"]);
+    for name in ["white.paint", "sample:white"] {
+        desk.refused(3, &["estimate", "ingest", name]);
+    }
+    // A file is opened whole, so that the picture is the very one; of a sample a few angles are made to estimate it.
+    desk.ok(&["samples", "export", "bmw339", "--out", "p.paint"]);
+    let picture = ["p.paint", "--size", "40x24"];
+    let estimate = [&["estimate", "preview"], &picture[..], &["--json"]].concat();
+    let estimate = json(&desk.ok(&estimate).stdout);
+    desk.ok(&[&["preview"], &picture[..], &["--out", "x.png"]].concat());
+    assert_eq!(estimate["bytes"], desk.read("x.png").len());
+}
+
 /// Samples of paints have other hashes than the paints: their canonical order may be another.
 #[test]
 fn an_estimate_does_not_guess_the_error_of_a_canonical_order() {

@@ -82,6 +82,8 @@ async fn profiles_are_names_or_knobs_and_targets_are_answered_with_what_was_pick
             "/v1/paints/{a}/preview.png?max_seconds=1&size=8x8"
         ))
         .await;
+    let stages = quick.header("server-timing").expect("stages");
+    assert!(stages.contains("search;dur="), "{stages}");
     assert_eq!(
         (quick.status, quick.header("carpaint-accuracy")),
         (200, Some("sampling-mean-de2000=0.5"))

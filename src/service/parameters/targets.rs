@@ -109,7 +109,7 @@ pub fn told(mut response: Response, picked: Option<&Picked>) -> Response {
 }
 
 /// The stage of looking for a profile.
-const SEARCH: &str = "profile";
+const SEARCH: &str = "search";
 
 impl Answer {
     /// With what was picked for a target, and what looking for it took.
