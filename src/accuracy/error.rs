@@ -6,16 +6,18 @@
 //! travel between the paints than they would have to: cost of the plan less its dual bound.
 //!
 //! ```text
-//! error = W1(pixels, clusters) + (cost − dual bound) + W1(slices left out, mixtures) + W1(box, rounded box)
+//! error = W1(pixels, clusters) + (cost − dual bound) + W1(slices left out, mixtures) + W1(slices, with fewer clusters)
+//!         + W1(box, rounded box)
 //! ```
 //!
 //! What instrument and eye would notice stands beside it: color and lit flakes at the six instrument geometries, and
 //! sparkle. Every step measures it against the one before, and the steps' figures are added up, which is no bound. It is
 //! measured at weights within the paints, and told of no others.
 //!
-//! The reference profile's transport and files have none of the last three. A realisation outside the paints multiplies
+//! The reference profile's transport and files have none but the first. A realisation outside the paints multiplies
 //! the first two by the sum of the weights' sizes.
 
+mod picture;
 mod seen;
 #[cfg(test)]
 mod tests;
@@ -23,12 +25,13 @@ mod tests;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+pub use self::picture::PictureError;
 pub use self::seen::SeenError;
 use super::WritingError;
 use super::writing::bundle_rounding_w1;
 use crate::blend::Blend;
 use crate::export::ExportSettings;
-use crate::paint::{Clustering, PaintFile};
+use crate::paint::{Clustering, PaintFile, Percentiles};
 
 /// Error of a result against the reference: in Lab, the distance by which its flakes' colors are misplaced.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
@@ -37,15 +40,18 @@ pub struct ResultError {
     pub lab: Option<f64>,
     /// What it is made of.
     pub terms: Vec<Term>,
-    /// What would be noticed of it; null for a solid color, and where a step was not measured.
+    /// What would be noticed of it; null where a step was not measured.
     pub seen: Option<SeenError>,
+    /// Why that is null.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unseen: Option<&'static str>,
 }
 
 /// One term of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
 #[schema(as = ErrorTerm)]
 pub struct Term {
-    /// What it is about: `clusters`, `transport`, `angles`, `rounding`.
+    /// What it is about: `clusters`, `transport`, `angles`, `reduction`, `rounding`.
     pub what: &'static str,
     /// Lab units; null where it is not known.
     pub lab: Option<f64>,
@@ -56,12 +62,13 @@ pub struct Term {
 impl ResultError {
     /// Of what has no flakes to misplace.
     fn none() -> Self {
-        Self::of(Vec::new(), None)
+        Self::of(Vec::new(), Ok(SeenError::none()))
     }
 
-    fn of(terms: Vec<Term>, seen: Option<SeenError>) -> Self {
+    fn of(terms: Vec<Term>, seen: Result<SeenError, &'static str>) -> Self {
         Self {
-            seen,
+            seen: seen.ok(),
+            unseen: seen.err(),
             // An empty sum of f64 is -0.
             lab: (terms.iter().map(|term| term.lab).sum::<Option<f64>>()).map(|sum| sum + 0.0),
             terms,
@@ -70,8 +77,23 @@ impl ResultError {
 
     /// The same of a file that shows something else than the paint.
     #[must_use]
-    pub fn unseen(self) -> Self {
-        Self { seen: None, ..self }
+    pub fn of_other_material(self) -> Self {
+        Self {
+            seen: None,
+            unseen: Some(OTHER_MATERIAL),
+            ..self
+        }
+    }
+
+    /// Why [`lab`](Self::lab) is not known, where it is not.
+    #[must_use]
+    pub fn unknown(&self) -> Option<&'static str> {
+        let unknown = self.terms.iter().find(|term| term.lab.is_none());
+        unknown.map(|term| term.how)
+    }
+
+    fn seen_or_why(&self) -> Result<SeenError, &'static str> {
+        self.seen.ok_or(self.unseen.unwrap_or(NOT_MEASURED))
     }
 
     /// The same beyond the paints: every term times the sum of the weights' sizes, at least 1; what would be seen was not
@@ -87,7 +109,11 @@ impl ResultError {
                     ..*term
                 })
                 .collect(),
-            self.seen.filter(|_| by <= 1.0 + WITHIN),
+            if by <= 1.0 + WITHIN {
+                self.seen_or_why()
+            } else {
+                Err(BEYOND)
+            },
         )
     }
 }
@@ -98,7 +124,10 @@ const WITHIN: f64 = 1e-9;
 const CLUSTERS: &str = "measured: W1 of lightness between pixels and clusters, nine of ten of the compared slices are within; \
                         of several paints the worst";
 const REALISED: &str = "bounded: error of the blend that a paint was realised from, where it is worse than what was measured of the others";
-const UNKNOWN: &str = "not known: the paint was not clustered here from pictures, was reduced to fewer clusters, or is of an older version";
+const UNKNOWN: &str =
+    "not known: the paint was not clustered here from pictures, or is of an older version";
+const REDUCTION: &str = "measured: W1 of lightness between slices and the same slices with fewer clusters, nine of ten of the \
+                         compared slices are within; of several paints the worst";
 const TRANSPORT: &str = "bounded: mean excess of the plans' cost over the dual bound; of several pairs of paints the worst";
 const TRANSPORT_SAMPLED: &str = "bounded on slices spread evenly over the angles: mean excess of the plans' cost over the dual bound of each pair alone; of \
                                  several pairs of paints the worst";
@@ -107,6 +136,14 @@ const ANGLES: &str = "measured: W1 of lightness between slices left out and the 
 const ROUNDING_OF_ALL: &str =
     "bounded: W1 between the boxes and the boxes read back, worst slice of the worst paint";
 const ROUNDING: &str = "bounded: W1 between the boxes and the boxes read back, worst of the slices at the instrument geometries";
+
+const NOT_MEASURED: &str = "a step was not measured: a paint was not clustered here from pictures, or is of an older version";
+const BEYOND: &str =
+    "it is measured within the paints; these weights, or this saturation, lead beyond them";
+const OTHER_MATERIAL: &str =
+    "the file shows a material that was fitted to the paint; what that loses stands beside";
+const AT_ANY_WEIGHTS: &str =
+    "what is seen of the rounding depends on the weights, which whoever shows the file chooses";
 
 /// Error of a paint; nothing is misplaced in a solid color.
 #[must_use]
@@ -117,7 +154,7 @@ pub fn paint_error(file: &PaintFile) -> ResultError {
     let clustering = file.clustering.as_ref();
     ResultError::of(
         vec![clusters([clustering].into_iter())],
-        SeenError::of_clusters(clustering),
+        SeenError::of_clusters(clustering).ok_or(NOT_MEASURED),
     )
 }
 
@@ -134,10 +171,12 @@ pub fn blend_error(blend: &Blend) -> ResultError {
         !report.without_flakes.contains(&place)
     });
     let worst = report.pairs.iter().map(|pair| pair.mean_gap);
-    let left_out = blend
-        .clusterings()
-        .filter_map(|clustering| Some(clustering?.left_out_w1?.p90))
-        .reduce(f64::max);
+    let worst_of = |get: fn(&Clustering) -> Option<Percentiles>| {
+        let all = blend
+            .clusterings()
+            .filter_map(|clustering| get(clustering?));
+        all.map(|w1| w1.p90).reduce(f64::max)
+    };
     let mut terms = vec![
         clusters(with_flakes.clone().map(|(_, clustering)| clustering)),
         Term {
@@ -154,15 +193,20 @@ pub fn blend_error(blend: &Blend) -> ResultError {
             },
         },
     ];
-    terms.extend(left_out.map(|lab| Term {
-        what: "angles",
-        lab: Some(lab),
-        how: ANGLES,
-    }));
+    for (what, lab, how) in [
+        ("angles", worst_of(|own| own.left_out_w1), ANGLES),
+        ("reduction", worst_of(|own| own.reduced_w1), REDUCTION),
+    ] {
+        terms.extend(lab.map(|lab| Term {
+            what,
+            lab: Some(lab),
+            how,
+        }));
+    }
     let each = with_flakes.map(|(_, clustering)| SeenError::of_clusters(clustering));
     let seen = each.reduce(|x, y| Some(x?.or_worse(y?))).flatten();
     let seen = seen.and_then(|seen| seen.and_transport(&report.against_exact));
-    ResultError::of(terms, seen)
+    ResultError::of(terms, seen.ok_or(NOT_MEASURED))
 }
 
 /// Error of a file written from a paint or a blend of this error.
@@ -173,7 +217,7 @@ pub fn file_error(of: &ResultError, writing: Option<&WritingError>) -> ResultErr
         lab: Some(writing.rounding_w1),
         how: ROUNDING,
     });
-    let seen = of.seen.map(|seen| match writing {
+    let seen = of.seen_or_why().map(|seen| match writing {
         Some(writing) => seen.and(&writing.instrument, &writing.lit, &writing.sparkle),
         None => seen,
     });
@@ -188,9 +232,10 @@ pub fn bundle_error(blend: &Blend, settings: &ExportSettings) -> ResultError {
         lab: Some(lab),
         how: ROUNDING_OF_ALL,
     });
-    // What would be noticed of the rounding depends on the weights.
     let of = blend_error(blend);
-    ResultError::of(of.terms.into_iter().chain(rounding).collect(), None)
+    let terms = of.terms.iter().copied().chain(rounding);
+    let seen = of.seen_or_why().and(Err(AT_ANY_WEIGHTS));
+    ResultError::of(terms.collect(), seen)
 }
 
 fn clusters<'a>(of: impl Iterator<Item = Option<&'a Clustering>>) -> Term {

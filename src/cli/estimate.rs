@@ -9,7 +9,7 @@ use serde_json::json;
 use super::ingest::{ReadingArgs, measurement};
 use super::number::whole;
 use super::output;
-use super::preview::{FrameArgs, ShowName, refuse_samples_of_angles};
+use super::preview::{FrameArgs, ShowName, refuse_samples_of_angles, refuse_samples_twice};
 use super::profile::TargetArgs;
 use super::weights::WeightArgs;
 use crate::workshop::{
@@ -156,13 +156,15 @@ impl Estimate {
             .iter()
             .map(|s| format!("{} {:.3}", s.stage, s.seconds))
             .collect();
+        let why = estimate.error.unknown;
         output::print(&format!(
-            "profile: {}\nseconds: {:.3} ({})\nbytes: {}\nerror: {}\n",
+            "profile: {}\nseconds: {:.3} ({})\nbytes: {}\nerror: {}{}\n",
             estimate.profile,
             estimate.seconds,
             stages.join(", "),
             estimate.bytes,
-            estimate.error
+            estimate.error,
+            why.map_or(String::new(), |why| format!(" ({why})"))
         ))
     }
 
@@ -232,6 +234,7 @@ impl Estimate {
                 target,
             } => {
                 refuse_samples_of_angles(*show, *spp, target, input)?;
+                refuse_samples_twice(*spp, &target.profile)?;
                 let (mut opened, thing) = sample_to_estimate(input, options)?;
                 let weights = weights.for_thing(&thing)?;
                 let begun = Instant::now();

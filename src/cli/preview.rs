@@ -9,7 +9,7 @@ use super::ingest::ReadingArgs;
 use super::made;
 use super::number::whole;
 use super::output;
-use super::profile::TargetArgs;
+use super::profile::{ProfileArgs, TargetArgs};
 use super::progress::Progress;
 use super::weights::WeightArgs;
 use crate::workshop::{
@@ -178,10 +178,24 @@ pub fn refuse_samples_of_angles(
     Ok(())
 }
 
+/// Samples per pixel that contradict those of the profile beside them are refused.
+pub fn refuse_samples_twice(spp: Option<u32>, args: &ProfileArgs) -> Result<(), WorkshopError> {
+    match spp.zip(args.knobs()?.samples_per_pixel) {
+        Some((spp, own)) if spp != own => {
+            let problem = format!(
+                "--spp is {spp}, and samples_per_pixel {own} in the profile beside it; accepted is one of the two"
+            );
+            Err(WorkshopError::usage("--spp", problem))
+        }
+        _ => Ok(()),
+    }
+}
+
 impl Preview {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
         refuse_samples_of_angles(self.show, self.spp, &self.target, &self.input)?;
         let options = ReadingArgs::default().options(None, &self.target.profile)?;
+        refuse_samples_twice(self.spp, &self.target.profile)?;
         let format = PictureFormat::of_path(&self.out)?;
         let mut stages = Laps::begin();
         let progress = Progress::reading(&self.input);
@@ -234,15 +248,11 @@ impl Preview {
         drop(progress);
         stages.end("write");
         made::write_seconds(self.timings.as_deref(), stages)?;
-        let noise = made.report.pointer("/rendering/sampling/mean_delta_e");
-        let noise = noise.and_then(serde_json::Value::as_f64);
         let size = format!(
             "{} x {}{}",
             self.frame.size.width,
             self.frame.size.height,
-            noise.map_or(String::new(), |noise| format!(
-                ", samples leave CIEDE2000 {noise:.2} to chance in the mean"
-            ))
+            error_told(&made.report)
         );
         made::tell(
             json,
@@ -251,5 +261,20 @@ impl Preview {
             picked.as_ref().filter(|_| json),
             &size,
         )
+    }
+}
+
+/// Error of a picture of a paint, for people.
+fn error_told(report: &serde_json::Value) -> String {
+    let number = |name: &str| report.pointer(&format!("/picture_error/{name}"))?.as_f64();
+    match (number("samples"), number("paint")) {
+        (Some(samples), Some(paint)) => format!(
+            ", off by CIEDE2000 {:.2} in the mean: samples leave {samples:.2} to chance, {paint:.2} is the paint's",
+            samples + paint
+        ),
+        (Some(samples), None) => format!(
+            ", samples leave CIEDE2000 {samples:.2} to chance in the mean; how far off the paint is, is not known"
+        ),
+        _ => String::new(),
     }
 }

@@ -35,8 +35,8 @@ pub struct ProfileArgs {
 pub struct TargetArgs {
     #[command(flatten)]
     pub profile: ProfileArgs,
-    /// In place of a profile: the cheapest whose error is at most this; for flakes in Lab, for pictures what their samples
-    /// leave to chance, in CIEDE2000.
+    /// In place of a profile: the cheapest whose error is at most this: of flakes in Lab; of pictures in CIEDE2000, in the
+    /// mean, what their samples leave to chance and how far off the paint is.
     #[arg(long, value_name = "E", value_parser = above_zero, allow_hyphen_values = true,
         conflicts_with_all = ["profile", "knobs", "clusters"])]
     pub max_error: Option<f64>,
@@ -53,7 +53,7 @@ impl ProfileArgs {
         let is_file = Path::new(&self.profile)
             .extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-        let mut knobs: Knobs = if is_file {
+        let knobs: Knobs = if is_file {
             let bytes = read(Path::new(&self.profile), &Limits::default())?;
             let mut reader = serde_json::Deserializer::from_slice(&bytes);
             Knobs::of_name_or_object(&mut reader)
@@ -61,11 +61,20 @@ impl ProfileArgs {
         } else {
             self.profile.parse().map_err(wrong)?
         };
-        for turned in &self.knobs {
-            knobs = turned.over(&knobs).map_err(wrong)?;
+        let mut turned = Knobs {
+            clusters: self.clusters,
+            ..Knobs::default()
+        };
+        for also in &self.knobs {
+            if let Some((knob, one, other)) = turned.contradicted_by(also) {
+                let problem = format!(
+                    "{knob} is turned twice, to {one} and to {other}; accepted is one of the two"
+                );
+                return Err(WorkshopError::usage("--knob", problem));
+            }
+            turned = also.over(&turned).map_err(wrong)?;
         }
-        knobs.clusters = self.clusters.or(knobs.clusters);
-        Ok(knobs)
+        turned.over(&knobs).map_err(wrong)
     }
 
     /// Whether anything but the usual profile is asked for.

@@ -135,6 +135,9 @@ pub fn fit_flakes(
         left_out_seen: None,
         error: None,
         realised_lab: None,
+        realised_seen: None,
+        reduced_w1: None,
+        reduced_seen: None,
     };
     Ok(FittedFlakes {
         flakes,

@@ -7,7 +7,7 @@ use super::energy::EnergyCertificate;
 use super::finite::{NotFinite, check_corners, check_list};
 use super::{
     AngleGrid, CarPaint, ClusteringError, Coat, ColorTable, FitResiduals, FlakeTexture, Flakes,
-    LeftOutSeen, Limits, Lobe, PaintError, Percentiles, ReadingResiduals, Realisation,
+    Limits, Lobe, PaintError, Percentiles, ReadingResiduals, Realisation, SeenDifference,
 };
 use crate::color::{Lab, LinearRgb};
 
@@ -66,13 +66,23 @@ pub struct Clustering {
     pub left_out_w1: Option<Percentiles>,
     /// What of that would be noticed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub left_out_seen: Option<LeftOutSeen>,
+    pub left_out_seen: Option<SeenDifference>,
     /// How far the clusters are from the pixels, where it was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<ClusteringError>,
     /// Error in Lab of the blend that the paint was realised from; no pictures of it exist to compare with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub realised_lab: Option<f64>,
+    /// What would be noticed of that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub realised_seen: Option<SeenDifference>,
+    /// Distance W1 of the lightnesses between slices and themselves with fewer clusters, Lab units; only of a realised
+    /// paint that was reduced for another blend.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reduced_w1: Option<Percentiles>,
+    /// What would be noticed of that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reduced_seen: Option<SeenDifference>,
 }
 
 impl Clustering {
@@ -102,13 +112,33 @@ impl Clustering {
         if !(1..=90).contains(&self.angle_step) {
             return refuse("angle_step", &self.angle_step, "1 to 90");
         }
-        let seen = self.left_out_seen.iter();
-        if let Some(off) = seen
-            .flat_map(|seen| [seen.delta_e_2000, seen.sparkle, seen.lit])
-            .flatten()
-            .find(|off| !(*off >= 0.0 && off.is_finite()))
-        {
-            return refuse("left_out_seen", &off, "0 or more");
+        for (field, seen) in [
+            ("left_out_seen", &self.left_out_seen),
+            ("realised_seen", &self.realised_seen),
+            ("reduced_seen", &self.reduced_seen),
+        ] {
+            let figures = seen
+                .iter()
+                .flat_map(|seen| [seen.delta_e_2000, seen.sparkle, seen.lit]);
+            if let Some(off) = figures
+                .flatten()
+                .find(|off| !(*off >= 0.0 && off.is_finite()))
+            {
+                return refuse(field, &off, "0 or more");
+            }
+        }
+        for (field, w1) in [
+            ("w1_bound", &self.w1_bound),
+            ("left_out_w1", &self.left_out_w1),
+            ("reduced_w1", &self.reduced_w1),
+        ] {
+            let figures = w1.iter().flat_map(|w1| [w1.p90, w1.worst]);
+            if let Some(off) = figures
+                .into_iter()
+                .find(|off| !(*off >= 0.0 && off.is_finite()))
+            {
+                return refuse(field, &off, "0 or more");
+            }
         }
         if let Some(lab) = self
             .realised_lab

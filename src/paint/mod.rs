@@ -55,8 +55,8 @@ pub(crate) use magnitude::largest_magnitude;
 pub use realisation::{Clamp, Realisation};
 pub use reflectance::{Chi, Reflectance, Terms};
 pub use residuals::{
-    ClusteringError, FitResiduals, InstrumentError, LeftOutSeen, LuminanceError, Percentiles,
-    ReadingError, ReadingResiduals,
+    ClusteringError, FitResiduals, InstrumentError, LuminanceError, Percentiles, ReadingError,
+    ReadingResiduals, SeenDifference,
 };
 pub use shared_list::SharedList;
 pub(crate) use sparkle::pcg;

@@ -92,14 +92,15 @@ pub struct ClusteringError {
     pub lit: Option<[f64; 6]>,
 }
 
-/// What leaving out angles changes at the six instrument geometries, in the order of
+/// What a change of the flakes changes at the six instrument geometries, in the order of
 /// [`ASPECULAR_DEG`](super::ASPECULAR_DEG). Relative differences are 0 or more, 1 is all.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LeftOutSeen {
+pub struct SeenDifference {
     /// CIEDE2000 of the mean color, base included.
     pub delta_e_2000: [f64; 6],
-    /// Relative difference of the 99.9th percentile of the flakes' luminance.
+    /// Relative difference of the 99.9th percentile of the flakes' luminance; the worst at all of them, where no more is
+    /// known.
     pub sparkle: [f64; 6],
     /// Relative difference of how many flakes are lit, fewer than one texel in a thousand counted as that many.
     pub lit: [f64; 6],

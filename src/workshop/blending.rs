@@ -2,7 +2,7 @@
 
 use super::WorkshopError;
 use super::describing::blend_notes;
-use crate::accuracy::{Profile, blend_deviation, left_out_seen, left_out_w1};
+use crate::accuracy::{Profile, blend_deviation, left_out_w1, reduced_w1, seen_between};
 use crate::blend::{Blend, BlendError, Ingredient, Origin, Reduction, Thinning};
 use crate::fit::{ClusterSettings, reduce_clusters};
 use crate::paint::{CarPaint, Clamp, Clustering, PaintFile};
@@ -111,11 +111,11 @@ impl Ready {
             clustering.angle_step *= step;
             if let Some(kept) = &thinned {
                 clustering.left_out_w1 = Some(left_out_w1(flakes, step));
-                clustering.left_out_seen = left_out_seen(&file.paint, kept);
+                clustering.left_out_seen = seen_between(&file.paint, flakes, kept);
             }
-            if fewer.is_some() {
-                // What taking several clusters for one misplaces is not measured.
-                clustering.realised_lab = None;
+            if let Some(fewer) = &fewer {
+                clustering.reduced_w1 = Some(reduced_w1(kept, fewer));
+                clustering.reduced_seen = seen_between(&file.paint, kept, fewer);
             }
         }
         Self {

@@ -8,11 +8,10 @@ use utoipa::ToSchema;
 
 use super::realising::{Made, check, choose, error_of};
 use super::{Laps, Thing, WorkshopError, read};
+use crate::accuracy::PictureError;
 use crate::blend::RealisationWeights;
 use crate::paint::{CarPaint, Limits};
-use crate::render::{
-    self, DirectionalLight, Environment, RenderError, SamplingError, Scene, Shape,
-};
+use crate::render::{self, DirectionalLight, Environment, RenderError, Scene, Shape};
 
 /// Most samples of one picture that a service draws or a target is looked for with: pixels times samples per pixel.
 pub const MOST_SAMPLES: u64 = 1 << 28;
@@ -154,13 +153,15 @@ pub fn preview(
     }
     .map_err(WorkshopError::internal)?;
     laps.end("encode");
+    let error = error_of(thing, weights);
     let report = json!({
         "realisation": chosen.report,
         "rendering": rendering.report,
-        "error": error_of(thing, weights),
+        "picture_error": PictureError::of(rendering.report.sampling.mean_delta_e, &error),
+        "error": error,
     });
     let mut notes = chosen.notes;
-    if let Some(lab) = error_of(thing, weights).lab.filter(|lab| *lab > TELLING) {
+    if let Some(lab) = error.lab.filter(|lab| *lab > TELLING) {
         notes.push(format!(
             "the flakes themselves are {lab:.2} Lab off, which no number of samples mends: cluster them more finely"
         ));
@@ -212,16 +213,18 @@ fn angles(
     Ok(with_held(made, scene))
 }
 
-/// What the samples of a picture will leave to chance.
-pub(super) fn sampling(
+/// Error of a picture that is not drawn yet.
+pub(super) fn picture_error(
     thing: &Thing,
     weights: Option<&RealisationWeights>,
     options: &PreviewOptions,
     limits: &Limits,
-) -> Result<SamplingError, WorkshopError> {
+) -> Result<PictureError, WorkshopError> {
     let scene = scene_of(options);
     let chosen = choose(thing, weights)?;
-    render::sampling(&chosen.paint, &scene, limits).map_err(refused)
+    let sampling = render::sampling(&chosen.paint, &scene, limits).map_err(refused)?;
+    let of = error_of(thing, weights);
+    Ok(PictureError::of(sampling.mean_delta_e, &of))
 }
 
 fn scene_of(options: &PreviewOptions) -> Scene {

@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 use super::describing::describe_correspondence;
 use super::{Lap, Laps, Thing, WorkshopError};
 use crate::accuracy::{
-    Profile, ResultError, blend_error, file_error, paint_error, sparkle, writing_error,
+    Profile, ResultError, SeenError, blend_error, file_error, paint_error, sparkle, writing_error,
 };
 use crate::blend::{Blend, RealisationWeights};
 use crate::export::{self, About, ExportSettings};
@@ -201,7 +201,7 @@ pub fn realise(
     laps.end("realise");
     // Viewers of a GLB see its material, whose own loss stands beside.
     let error = match format {
-        Format::Glb => error_of(thing, weights).unseen(),
+        Format::Glb => error_of(thing, weights).of_other_material(),
         _ => error_of(thing, weights),
     };
     // Only textures are rounded: a GLB and a .paint carry lists as they are.
@@ -252,19 +252,19 @@ fn accuracy(of: &ResultError, paint: &CarPaint, textures: Option<&ExportSettings
     })
 }
 
-/// Error of a thing at some weights as it is written with these settings, Lab.
+/// Error of a thing at some weights as it is written with these settings.
 pub(super) fn error_as_written(
     thing: &Thing,
     weights: Option<&RealisationWeights>,
     format: Format,
     settings: &ExportSettings,
-) -> Result<Option<f64>, WorkshopError> {
+) -> Result<ResultError, WorkshopError> {
     let of = error_of(thing, weights);
     if !matches!(format, Format::Zip | Format::Json) {
-        return Ok(of.lab);
+        return Ok(of);
     }
     let writing = writing_error(&choose(thing, weights)?.paint, settings);
-    Ok(file_error(&of, writing.as_ref()).lab)
+    Ok(file_error(&of, writing.as_ref()))
 }
 
 /// Error of a thing at some weights, before anything is written of it.
@@ -291,6 +291,9 @@ fn paint_file(chosen: &Chosen, error: &ResultError) -> PaintFile {
         left_out_seen: None,
         error: None,
         realised_lab: error.lab,
+        realised_seen: error.seen.as_ref().map(SeenError::kept),
+        reduced_w1: None,
+        reduced_seen: None,
     });
     let energy = certify(&chosen.paint);
     // What was clamped stands with the provenance.

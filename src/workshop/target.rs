@@ -13,7 +13,7 @@ use std::time::Instant;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::estimate::{Estimate, Work};
+use super::estimate::{Estimate, EstimatedError, Work};
 use super::{Format, IngestOptions, WorkshopError, blend_paints, open_paints};
 use crate::accuracy::{Knobs, Profile, blend_error};
 use crate::paint::PaintFile;
@@ -23,7 +23,7 @@ use ladder::ladder;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, ToSchema)]
 #[schema(as = AskedTarget)]
 pub struct Target {
-    /// Largest error: for flakes in Lab, for pictures what their samples leave to chance, in CIEDE2000.
+    /// Largest error: of flakes in Lab; of pictures in CIEDE2000, what samples leave to chance and the paint's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_error: Option<f64>,
     /// Longest time, seconds: of the search for a profile and of the work with it.
@@ -277,7 +277,7 @@ fn measure_error(work: &Work<'_>, estimate: &mut Estimate) -> Result<(), Worksho
     match *work {
         Work::Blend { paints } => {
             let blend = blend_paints(paints, &profile, &|_| ())?.blend;
-            estimate.error.value = blend_error(&blend).lab;
+            estimate.error = EstimatedError::lab(&blend_error(&blend));
         }
         Work::BlendNames { names, options } => {
             let options = IngestOptions {
@@ -298,7 +298,7 @@ fn measure_error(work: &Work<'_>, estimate: &mut Estimate) -> Result<(), Worksho
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::workshop::{EstimatedError, Stage};
+    use crate::workshop::Stage;
 
     fn estimate(seconds: f64, error: f64) -> Estimate {
         Estimate {
@@ -313,6 +313,7 @@ mod tests {
             error: EstimatedError {
                 value: Some(error),
                 unit: "Lab",
+                unknown: None,
                 at_least: None,
             },
         }

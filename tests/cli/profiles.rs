@@ -52,6 +52,13 @@ fn knobs_are_turned_by_name_and_unknown_ones_are_refused_with_what_there_is() {
         desk.refused(2, &export(&["--knob", "clusters=0"]))
             .contains("1 to 4096")
     );
+    let twice = ["--knob", "clusters=9", "--knob", "clusters=10"];
+    let said = desk.refused(2, &export(&twice));
+    assert!(said.contains("to 9 and to 10"), "{said}");
+    desk.refused(2, &export(&["--knob", "clusters=9", "--clusters", "10"]));
+    desk.ok(&export(&["--knob", "clusters=9", "--clusters", "9"]));
+    let said = desk.refused(2, &export(&["--knob", "clusters"]));
+    assert!(said.contains("clusters=100"), "{said}");
     fs::write(
         desk.path("bad.json"),
         r#"{"preset": "draft", "samples": 9}"#,
@@ -120,6 +127,82 @@ fn a_picture_takes_the_fewest_samples_that_are_enough() {
     assert_eq!(picked(["--max-seconds", "1e-6"]), (false, 1));
     let (met, samples) = picked(["--max-error", "1"]);
     assert!(met && (1..=1024).contains(&samples), "{samples}");
+}
+
+/// No number of samples mends a paint that is off: a target counts both.
+#[test]
+fn a_picture_is_as_far_off_as_its_samples_and_its_paint_together() {
+    let desk = Desk::new();
+    let few =
+        "blend sample:bmw339 sample:ford_f8 --knob clusters=4 --knob angle_step=16 --out b.blend";
+    desk.ok(&few.split(' ').collect::<Vec<_>>());
+    let drawn = |weights: &'static str, more: &[&'static str]| {
+        let words = [
+            "preview",
+            "b.blend",
+            "--weights",
+            weights,
+            "--size",
+            "24x24",
+            "--json",
+        ];
+        json(
+            &desk
+                .ok(&[&words[..], more, &["--out", "p.png"]].concat())
+                .stdout,
+        )
+    };
+    let made = drawn("0.5,0.5", &["--max-error", "1"]);
+    assert_eq!(made["picked"]["met"], false, "{made}");
+    let error = &made["report"]["picture_error"];
+    let [all, samples, paint] =
+        ["delta_e_2000", "samples", "paint"].map(|part| error[part].as_f64().expect("measured"));
+    assert!(
+        paint > 1.0 && (all - samples - paint).abs() < 1e-12,
+        "{error}"
+    );
+    assert_eq!(
+        drawn("0.5,0.5", &["--max-error", "100"])["picked"]["met"],
+        true
+    );
+    // Beyond the paints nobody has measured it, and that is said.
+    let beyond = drawn("-0.5,1.5", &["--max-error", "100"]);
+    let estimated = &beyond["picked"]["estimate"]["error"];
+    assert_eq!(
+        (&beyond["picked"]["met"], &estimated["value"]),
+        (&false.into(), &serde_json::Value::Null)
+    );
+    assert!(
+        estimated["unknown"]
+            .as_str()
+            .is_some_and(|why| why.contains("beyond")),
+        "{estimated}"
+    );
+}
+
+/// A realised paint goes on with the error of its blend, and what taking fewer clusters costs is measured.
+#[test]
+fn what_is_realised_and_reduced_is_known_to_be_off() {
+    let desk = Desk::new();
+    let made = |words: &str| json(&desk.ok(&words.split(' ').collect::<Vec<_>>()).stdout);
+    made("blend sample:bmw339 sample:ford_f8 --profile draft --out b.blend --json");
+    let realised = made("realise b.blend --weights 0.5,0.5 --out r.paint --json");
+    let error = &realised["report"]["accuracy"]["error"];
+    let shown = made("show r.paint --json");
+    assert_eq!(
+        shown["error"]["seen"]["delta_e_2000"],
+        error["seen"]["delta_e_2000"]
+    );
+    let again = made("blend r.paint sample:bmw339 --knob clusters=12 --out c.blend --json");
+    let error = &again["error"];
+    let reduction = error["terms"].as_array().expect("terms").iter();
+    let reduction = reduction.clone().find(|term| term["what"] == "reduction");
+    let lab = reduction.and_then(|term| term["lab"].as_f64());
+    assert!(lab.is_some_and(|lab| lab > 0.0), "{error}");
+    assert!(
+        error["lab"].as_f64() > lab && error["seen"].is_object(),
+        "{error}"
+    );
 }
 
 /// Bytes and error; what seconds are worth is measured by `tests/bench/estimates.rs`, beside nothing else.

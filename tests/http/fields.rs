@@ -231,6 +231,11 @@ async fn a_silly_parameter_is_refused_with_its_name_its_value_and_what_is_accept
             "/profile",
             "1 to 16",
         ),
+        (
+            "preview.png?spp=4&profile=samples_per_pixel=5",
+            "/spp",
+            "one of the two",
+        ),
     ];
     for (path, pointer, accepted) in cases {
         let answer = house.get(&format!("/v1/paints/{paint}/{path}")).await;

@@ -191,6 +191,7 @@ impl Works for Pretend {
             error: EstimatedError {
                 value: Some(0.25),
                 unit: "Lab",
+                unknown: None,
                 at_least: None,
             },
         })

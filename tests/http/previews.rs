@@ -61,6 +61,14 @@ async fn a_picture_has_its_report_beside_it_and_a_whole_scene_is_posted() {
         ),
         (json!({"paint": a, "format": "gif"}), "/format"),
         (json!({"paint": a, "profile": "best"}), "/profile"),
+        (
+            json!({"blend": blend, "weights": [0.5, 0.5], "profile": {"clusters": 7}}),
+            "/profile/clusters",
+        ),
+        (
+            json!({"paint": a, "samples_per_pixel": 4, "profile": {"samples_per_pixel": 5}}),
+            "/samples_per_pixel",
+        ),
     ];
     for (scene, pointer) in refusals {
         let answer = house.post_json("/v1/previews", &scene.to_string()).await;

@@ -137,7 +137,7 @@ async fn profiles_are_names_or_knobs_and_targets_are_answered_with_what_was_pick
         .await;
     assert_eq!(
         estimate.problem(422, "invalid-value")["pointer"],
-        "/profile"
+        "/profile/cost"
     );
 
     let shipped = house.get("/v1/accuracy").await;

@@ -4,9 +4,9 @@ use crate::paints::{D, H, blend, metallic, solid};
 use carpaint::blend::{Blend, BlendDeviation, BlendError, BlendSettings, Ingredient};
 use carpaint::color::Lab;
 use carpaint::paint::{
-    CarPaint, Clamp, Clustering, Coat, ColorTable, ColorTableError, FitResiduals, LeftOutSeen,
-    LuminanceError, PaintFile, Percentiles, Provenance, ReadingError, ReadingResiduals,
-    Realisation, certify,
+    CarPaint, Clamp, Clustering, Coat, ColorTable, ColorTableError, FitResiduals, LuminanceError,
+    PaintFile, Percentiles, Provenance, ReadingError, ReadingResiduals, Realisation,
+    SeenDifference, certify,
 };
 
 type ChangeOfFile = fn(&mut PaintFile, f64);
@@ -80,20 +80,27 @@ fn clustering() -> Clustering {
         angle_step: 1,
         w1_bound: Some(Percentiles::default()),
         left_out_w1: Some(Percentiles::default()),
-        left_out_seen: Some(LeftOutSeen {
+        left_out_seen: Some(SeenDifference {
             delta_e_2000: [0.5; 6],
             sparkle: [0.25; 6],
             lit: [0.125; 6],
         }),
         error: None,
         realised_lab: Some(0.5),
+        realised_seen: None,
+        reduced_w1: Some(Percentiles::default()),
+        reduced_seen: Some(SeenDifference {
+            delta_e_2000: [0.5; 6],
+            sparkle: [0.25; 6],
+            lit: [0.125; 6],
+        }),
     }
 }
 
 #[test]
 fn a_paint_with_a_number_that_is_none_is_refused_by_its_place() {
     file().to_bytes().expect("a whole file is written");
-    let cases: [(&str, ChangeOfFile); 18] = [
+    let cases: [(&str, ChangeOfFile); 20] = [
         ("physical.diffuse[1]", |f, v| f.paint.diffuse[1] = v),
         ("physical.coat.ior", |f, v| {
             f.paint.coat.as_mut().expect("coated").ior = v;
@@ -136,6 +143,14 @@ fn a_paint_with_a_number_that_is_none_is_refused_by_its_place() {
         ("clustering.left_out_seen.sparkle[5]", |f, v| {
             let seen = f.clustering.as_mut().expect("has").left_out_seen.as_mut();
             seen.expect("has").sparkle[5] = v;
+        }),
+        ("clustering.reduced_w1.p90", |f, v| {
+            let w1 = f.clustering.as_mut().expect("has").reduced_w1.as_mut();
+            w1.expect("has").p90 = v;
+        }),
+        ("clustering.reduced_seen.lit[0]", |f, v| {
+            let seen = f.clustering.as_mut().expect("has").reduced_seen.as_mut();
+            seen.expect("has").lit[0] = v;
         }),
         ("energy.albedo[0]", |f, v| f.energy.albedo[0] = v),
         ("provenance.realisation.base[1]", |f, v| {

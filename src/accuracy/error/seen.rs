@@ -4,7 +4,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::blend::BlendDeviation;
-use crate::paint::{ASPECULAR_DEG, Clustering};
+use crate::paint::{ASPECULAR_DEG, Clustering, SeenDifference};
 
 /// What would be noticed of an error: sums of what was measured step by step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
@@ -23,22 +23,57 @@ pub struct SeenError {
 }
 
 impl SeenError {
-    /// Of clusters against pixels, and of the angles that were left out since.
+    /// Of what has no flakes to misplace.
+    pub(super) fn none() -> Self {
+        Self {
+            aspecular_deg: ASPECULAR_DEG,
+            delta_e_2000: [0.0; 6],
+            lit: [0.0; 6],
+            sparkle: 0.0,
+            how: NOTHING,
+        }
+    }
+
+    /// The same as a paint keeps it that is realised with it.
+    #[must_use]
+    pub const fn kept(&self) -> SeenDifference {
+        SeenDifference {
+            delta_e_2000: self.delta_e_2000,
+            sparkle: [self.sparkle; 6],
+            lit: self.lit,
+        }
+    }
+
+    /// Of clusters against pixels, or of the blend that they were realised from; and of the angles that were left out and
+    /// the clusters that were merged since.
     pub(super) fn of_clusters(clustering: Option<&Clustering>) -> Option<Self> {
         let clustering = clustering?;
-        let error = clustering.error.as_ref()?;
-        let of_clusters = Self {
-            aspecular_deg: ASPECULAR_DEG,
-            delta_e_2000: error.instrument,
-            lit: error.lit?,
-            sparkle: error.sparkle.p90,
-            how: SEEN,
+        let mut seen = match (&clustering.error, clustering.realised_seen) {
+            (Some(error), _) => Self {
+                delta_e_2000: error.instrument,
+                lit: error.lit?,
+                sparkle: error.sparkle.p90,
+                how: SEEN,
+                ..Self::none()
+            },
+            (None, Some(of_blend)) => Self {
+                how: SEEN,
+                ..Self::none()
+            }
+            .and_step(&of_blend),
+            (None, None) => return None,
         };
-        if clustering.left_out_w1.is_none() {
-            return Some(of_clusters);
+        if clustering.left_out_w1.is_some() {
+            seen = seen.and_step(&clustering.left_out_seen?);
         }
-        let seen = clustering.left_out_seen?;
-        Some(of_clusters.and(&seen.delta_e_2000, &seen.lit, &seen.sparkle))
+        if clustering.reduced_w1.is_some() {
+            seen = seen.and_step(&clustering.reduced_seen?);
+        }
+        Some(seen)
+    }
+
+    fn and_step(self, step: &SeenDifference) -> Self {
+        self.and(&step.delta_e_2000, &step.lit, &step.sparkle)
     }
 
     /// The worse of two, figure by figure.
@@ -85,5 +120,7 @@ fn each(mut all: [f64; 6], others: &[f64], of: impl Fn(f64, f64) -> f64) -> [f64
     all
 }
 
-const SEEN: &str = "measured step by step and added up: clusters against pixels, and fewer angles against all, of several paints the \
-                    worst; a blend against exact transport in the same order, at equal weights; a file against the paint";
+const NOTHING: &str = "exact: there are no flakes to misplace";
+
+const SEEN: &str = "measured step by step and added up: clusters against pixels, or the blend that a paint was realised from, fewer \
+                    angles or clusters against all, of several paints the worst; a blend against exact transport in the same order, at equal weights; a file against the paint";

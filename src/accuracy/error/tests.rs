@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::blend::BlendDeviation;
-use crate::paint::{ASPECULAR_DEG, ClusteringError, LeftOutSeen, Percentiles};
+use crate::paint::{ASPECULAR_DEG, ClusteringError, Percentiles, SeenDifference};
 
 fn clustering(color: f64, lit: Option<f64>, sparkle: f64) -> Clustering {
     let at_p90 = |p90| Percentiles {
@@ -26,6 +26,9 @@ fn clustering(color: f64, lit: Option<f64>, sparkle: f64) -> Clustering {
             lit: lit.map(|lit| [lit; 6]),
         }),
         realised_lab: None,
+        realised_seen: None,
+        reduced_w1: None,
+        reduced_seen: None,
     }
 }
 
@@ -57,7 +60,7 @@ fn what_was_not_measured_is_not_told() {
     };
     assert!(seen(&thinned).is_none());
     let known = Clustering {
-        left_out_seen: Some(LeftOutSeen {
+        left_out_seen: Some(SeenDifference {
             delta_e_2000: [0.5; 6],
             sparkle: [0.25, 0.125, 0.0, 0.0, 0.0, 0.0],
             lit: [0.25; 6],
@@ -97,11 +100,60 @@ fn the_worst_paint_counts_and_steps_add_up_geometry_by_geometry() {
         lit: vec![0.1; 6],
         inverse_cdf_loss: None,
     };
-    let of = ResultError::of(Vec::new(), Some(worse));
+    let of = ResultError::of(Vec::new(), Ok(worse));
     let file = file_error(&of, Some(&writing));
     let seen = file.seen.expect("measured");
     assert_eq!((seen.delta_e_2000, file.lab), ([1.2; 6], Some(0.05)));
     assert!((seen.lit[3] - 0.4).abs() < 1e-12 && (seen.sparkle - 0.09).abs() < 1e-12);
     assert!(of.stretched(1.0).seen.is_some() && of.stretched(1.6).seen.is_none());
-    assert!(of.unseen().seen.is_none());
+    let other = of.of_other_material();
+    assert!(other.seen.is_none() && other.unseen.is_some());
+}
+
+#[test]
+fn a_realised_paint_is_seen_as_its_blend_was_and_what_was_merged_since_adds_up() {
+    let of_blend = seen(&clustering(0.1, Some(0.3), 0.02)).expect("measured");
+    let realised = Clustering {
+        error: None,
+        realised_lab: Some(0.3),
+        realised_seen: Some(of_blend.kept()),
+        ..clustering(0.0, None, 0.0)
+    };
+    assert_eq!(seen(&realised), Some(of_blend));
+    let reduced = Clustering {
+        reduced_w1: Some(Percentiles::default()),
+        ..realised
+    };
+    assert!(seen(&reduced).is_none());
+    let measured = Clustering {
+        reduced_seen: Some(SeenDifference {
+            delta_e_2000: [0.25; 6],
+            sparkle: [0.0, 0.5, 0.0, 0.0, 0.0, 0.0],
+            lit: [0.0; 6],
+        }),
+        ..reduced
+    };
+    let measured = seen(&measured).expect("measured");
+    assert_eq!((measured.delta_e_2000, measured.lit), ([0.35; 6], [0.3; 6]));
+    assert_eq!(measured.sparkle, 0.52);
+}
+
+#[test]
+fn a_picture_is_off_by_chance_and_by_its_paint_or_nobody_knows_how_far() {
+    let seen = seen(&clustering(0.25, Some(0.0), 0.0)).expect("measured");
+    let of = ResultError::of(Vec::new(), Ok(seen));
+    let picture = PictureError::of(0.5, &of);
+    assert_eq!(
+        (picture.samples, picture.paint, picture.delta_e_2000),
+        (0.5, Some(0.25), Some(0.75))
+    );
+    assert_eq!(picture.with_samples(0.125).delta_e_2000, Some(0.375));
+    let beyond = PictureError::of(0.5, &of.stretched(1.6));
+    assert_eq!(
+        (beyond.samples, beyond.paint, beyond.delta_e_2000),
+        (0.5, None, None)
+    );
+    assert_eq!(Some(beyond.how), of.stretched(1.6).unseen);
+    let solid = PictureError::of(0.5, &ResultError::none());
+    assert_eq!(solid.delta_e_2000, Some(0.5));
 }

@@ -5,7 +5,9 @@
 #[non_exhaustive]
 pub enum ProfileError {
     /// Unknown preset.
-    #[error("there is no profile '{0}'; there are draft, standard and reference")]
+    #[error(
+        "there is no profile '{0}'; there are draft, standard and reference, and knobs as in clusters=100"
+    )]
     Name(String),
     /// A number out of range.
     #[error("{knob} is {value}, accepted is {accepted}")]

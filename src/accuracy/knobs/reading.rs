@@ -29,6 +29,20 @@ impl Knobs {
         Self::of_object(all)
     }
 
+    /// The first knob that both turn, and to different values: its name, this value and the other's.
+    #[must_use]
+    pub fn contradicted_by(&self, other: &Self) -> Option<(String, Value, Value)> {
+        let (Ok(Value::Object(own)), Ok(Value::Object(other))) =
+            (serde_json::to_value(self), serde_json::to_value(other))
+        else {
+            return None;
+        };
+        own.into_iter().find_map(|(knob, value)| {
+            let beside = other.get(&knob)?.clone();
+            (value != beside).then_some((knob, value, beside))
+        })
+    }
+
     fn of_object(object: Map<String, Value>) -> Result<Self, ProfileError> {
         serde_json::from_value(Value::Object(object)).map_err(|e| ProfileError::Knob(e.to_string()))
     }

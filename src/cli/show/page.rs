@@ -122,6 +122,9 @@ impl Page {
                 ),
             );
         }
+        if let Some(why) = error.unseen {
+            self.line("seen", format!("not known: {why}"));
+        }
     }
 
     pub fn text(self) -> String {

@@ -14,13 +14,13 @@ use crate::workshop::{Settled, check_clusters, settled};
 const ACCEPTED: &str =
     "draft, standard, reference, or knobs such as clusters=100 or {\"clusters\": 100}";
 
-/// A profile as it was asked for, and whether its clusters stood beside it.
+/// A profile as it was asked for, and the clusters that stood beside it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ProfileText(pub Knobs, bool);
+pub struct ProfileText(pub Knobs, Option<u32>);
 
 impl<'de> Deserialize<'de> for ProfileText {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Knobs::of_name_or_object(deserializer).map(|knobs| Self(knobs, false))
+        Knobs::of_name_or_object(deserializer).map(|knobs| Self(knobs, None))
     }
 }
 
@@ -76,11 +76,41 @@ impl ProfileText {
     /// The same with clusters that stand beside it.
     #[must_use]
     pub fn with_clusters(self, clusters: Option<u32>) -> Self {
-        let knobs = Knobs {
-            clusters: clusters.or(self.0.clusters),
+        Self(self.0, clusters)
+    }
+
+    /// The knobs, with those that stand beside them.
+    fn knobs(&self) -> Knobs {
+        Knobs {
+            clusters: self.1.or(self.0.clusters),
             ..self.0
-        };
-        Self(knobs, clusters.is_some())
+        }
+    }
+
+    /// Refuses samples per pixel that stand beside others in the profile of a query.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] that names the parameter.
+    pub fn refuse_other_samples(&self, spp: Option<u32>) -> Result<(), Problem> {
+        match twice("spp", spp, self.0.samples_per_pixel) {
+            Some((detail, accepted)) => Err(Problem::parameter("spp", detail).accepting(accepted)),
+            None => Ok(()),
+        }
+    }
+
+    /// The same of a body.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] that points at the field.
+    pub fn refuse_other_samples_in_body(&self, samples: Option<u32>) -> Result<(), Problem> {
+        match twice("samples_per_pixel", samples, self.0.samples_per_pixel) {
+            Some((detail, accepted)) => {
+                Err(Problem::value("/samples_per_pixel", detail).accepting(accepted))
+            }
+            None => Ok(()),
+        }
     }
 
     /// The profile, asked for in a query.
@@ -89,39 +119,63 @@ impl ProfileText {
     ///
     /// [`Problem`] that names the parameter and what would be accepted.
     pub fn of_query(&self) -> Result<Profile, Problem> {
-        self.0.profile().map_err(|error| {
+        if let Some((detail, accepted)) = twice("clusters", self.1, self.0.clusters) {
+            return Err(Problem::parameter("clusters", detail).accepting(accepted));
+        }
+        self.knobs().profile().map_err(|error| {
             let parameter = match error.knob() {
-                Some("clusters") if self.1 => "clusters",
+                Some("clusters") if self.1.is_some() => "clusters",
                 _ => "profile",
             };
             accepting(Problem::parameter(parameter, sentence(&error)), &error)
         })
     }
 
-    /// Refuses knobs that a paint or a blend was made by otherwise, to make something of it as it is.
+    /// Refuses knobs of a query that a paint or a blend was made by otherwise, to make something of it as it is.
     ///
     /// # Errors
     ///
     /// [`Problem`] that names the parameter.
     pub fn fits(&self, thing: &Shelved) -> Result<(), Problem> {
-        self.fits_clusters(thing)?;
-        let Some(Settled { knob, made, asked }) = settled(&thing.thing, &self.0) else {
-            return Ok(());
-        };
-        let detail = format!("{} was made with {knob}={made}, not {asked}.", thing.id);
-        let accepted = format!("{knob}={made}, or a profile without {knob}");
-        Err(Problem::parameter("profile", detail).accepting(accepted))
+        match self.made_otherwise(thing) {
+            Some(Misfit {
+                detail, accepted, ..
+            }) => Err(Problem::parameter("profile", detail).accepting(accepted)),
+            None => Ok(()),
+        }
     }
 
-    /// Refuses clusters that a paint or a blend does not have: paints are clustered when they are uploaded.
+    /// The same of a profile in a JSON body.
     ///
     /// # Errors
     ///
-    /// [`Problem`] that names the parameter.
-    pub fn fits_clusters(&self, thing: &Shelved) -> Result<(), Problem> {
-        let Some(wanted) = self.0.clusters else {
-            return Ok(());
-        };
+    /// [`Problem`] that points at the knob.
+    pub fn fits_in_body(&self, thing: &Shelved) -> Result<(), Problem> {
+        self.made_otherwise(thing).map_or(Ok(()), Misfit::in_body)
+    }
+
+    /// Refuses clusters, asked for in a JSON body, that a paint does not have: paints are clustered when they are uploaded.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] that points at the knob.
+    pub fn clusters_fit_in_body(&self, thing: &Shelved) -> Result<(), Problem> {
+        self.other_clusters(thing).map_or(Ok(()), Misfit::in_body)
+    }
+
+    fn made_otherwise(&self, thing: &Shelved) -> Option<Misfit> {
+        self.other_clusters(thing).or_else(|| {
+            let Settled { knob, made, asked } = settled(&thing.thing, &self.0)?;
+            Some(Misfit {
+                detail: format!("{} was made with {knob}={made}, not {asked}.", thing.id),
+                accepted: format!("{knob}={made}, or a profile without {knob}"),
+                knob,
+            })
+        })
+    }
+
+    fn other_clusters(&self, thing: &Shelved) -> Option<Misfit> {
+        let wanted = self.0.clusters?;
         let (fits, had, accepted) = match &thing.thing {
             Thing::Paint(paint) => (
                 check_clusters(&thing.id, paint, wanted as usize).is_ok(),
@@ -134,9 +188,11 @@ impl ProfileText {
                 "a profile without clusters, or a blend of paints uploaded with so many",
             ),
         };
-        let detail = format!("{} has {had} clusters a slice, not {wanted}.", thing.id);
-        let problem = || Problem::parameter("profile", detail).accepting(accepted);
-        fits.then_some(()).ok_or_else(problem)
+        (!fits).then(|| Misfit {
+            knob: "clusters".to_owned(),
+            detail: format!("{} has {had} clusters a slice, not {wanted}.", thing.id),
+            accepted: accepted.to_owned(),
+        })
     }
 
     /// The profile, asked for in a JSON body.
@@ -145,14 +201,38 @@ impl ProfileText {
     ///
     /// [`Problem`] that points at the field and says what would be accepted.
     pub fn of_body(&self) -> Result<Profile, Problem> {
-        self.0.profile().map_err(|error| {
+        if let Some((detail, accepted)) = twice("clusters", self.1, self.0.clusters) {
+            return Err(Problem::value("/clusters", detail).accepting(accepted));
+        }
+        self.knobs().profile().map_err(|error| {
             let pointer = match error.knob() {
-                Some("clusters") if self.1 => "/clusters".to_owned(),
+                Some("clusters") if self.1.is_some() => "/clusters".to_owned(),
                 Some(knob) => format!("/profile/{knob}"),
                 None => "/profile".to_owned(),
             };
             accepting(Problem::value(pointer, sentence(&error)), &error)
         })
+    }
+}
+
+/// What is wrong where a number stands beside a profile that turns the same knob to another, and what would be accepted.
+fn twice(field: &str, beside: Option<u32>, in_profile: Option<u32>) -> Option<(String, String)> {
+    let (beside, own) = beside.zip(in_profile)?;
+    let detail = format!("{field} is {beside}, and {own} in the profile beside it.");
+    (beside != own).then(|| (detail, "one of the two".to_owned()))
+}
+
+/// A knob that a thing was made by otherwise.
+struct Misfit {
+    knob: String,
+    detail: String,
+    accepted: String,
+}
+
+impl Misfit {
+    fn in_body(self) -> Result<(), Problem> {
+        let pointer = format!("/profile/{}", self.knob);
+        Err(Problem::value(pointer, self.detail).accepting(self.accepted))
     }
 }
 

@@ -142,6 +142,7 @@ impl ViewQuery {
         refuse_samples_of_angles(self.show.unwrap_or_default(), &sampled, &Names::QUERY)?;
         if let Some(asked) = &self.profile {
             asked.fits(thing)?;
+            asked.refuse_other_samples(self.spp)?;
         }
         let knobs = self.profile.is_some() || self.spp.is_some();
         let target = targets::of_query(self.max_error, self.max_seconds, knobs)?;

@@ -91,12 +91,11 @@ pub async fn create(
     let needed = Needed::of(&order, &app, &profile).await?;
     if let Some(asked) = &order.profile {
         for thing in needed.things() {
-            let fits = match needed {
+            match needed {
                 // A blend may leave out angles of its paints.
-                Needed::Blend(_) => asked.fits_clusters(thing),
-                _ => asked.fits(thing),
-            };
-            fits.map_err(Problem::in_body)?;
+                Needed::Blend(_) => asked.clusters_fit_in_body(thing)?,
+                _ => asked.fits_in_body(thing)?,
+            }
         }
     }
     let works = Arc::clone(&app.works);

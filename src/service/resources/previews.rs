@@ -51,7 +51,7 @@ impl PreviewFormat {
     responses(
         (status = 200, description = "The picture", headers(
             ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
-            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; FLIP between two drawings, usually above that of one; error of the flakes, Lab"),
+            ("Carpaint-Accuracy" = String, description = "Error of the picture, CIEDE2000 in the mean, where the paint's own is known; standard error by sampling, mean and 95th percentile over pixels; FLIP between two drawings, usually above that of one; error of the flakes, Lab"),
             ("Link" = String, description = "The picture's report")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
         (status = 400, description = "Weights that do not fit the blend, or a view that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
         BlendProblems,
@@ -79,7 +79,7 @@ pub async fn of_blend(
     responses(
         (status = 200, description = "The picture", headers(
             ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
-            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; FLIP between two drawings, usually above that of one; error of the flakes, Lab"),
+            ("Carpaint-Accuracy" = String, description = "Error of the picture, CIEDE2000 in the mean, where the paint's own is known; standard error by sampling, mean and 95th percentile over pixels; FLIP between two drawings, usually above that of one; error of the flakes, Lab"),
             ("Link" = String, description = "The picture's report")), content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
         PaintProblems,
     )
@@ -165,7 +165,7 @@ pub struct PreviewOrder {
     responses(
         (status = 200, description = "The picture", headers(
             ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
-            ("Carpaint-Accuracy" = String, description = "Standard error by sampling, CIEDE2000, mean and 95th percentile over pixels; FLIP between two drawings, usually above that of one; error of the flakes, Lab")),
+            ("Carpaint-Accuracy" = String, description = "Error of the picture, CIEDE2000 in the mean, where the paint's own is known; standard error by sampling, mean and 95th percentile over pixels; FLIP between two drawings, usually above that of one; error of the flakes, Lab")),
             content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"), (serde_json::Value = "application/json"))),
         (status = 422, description = "A paint that is not there, weights that do not fit, or a scene that is not offered", body = ProblemDocument, content_type = "application/problem+json"),
         Problems,
@@ -189,7 +189,8 @@ pub async fn create(
     let target = targets::of_body(order.max_error, order.max_seconds, knobs)?;
     let (thing, weights) = order.named().find(&app).await?;
     let asked = order.profile.clone().unwrap_or_default();
-    asked.fits(&thing).map_err(Problem::in_body)?;
+    asked.fits_in_body(&thing)?;
+    asked.refuse_other_samples_in_body(order.samples_per_pixel)?;
     let profile = asked.of_body()?;
     // How many samples it takes to meet a target is found once everything else is known to be right.
     let spp = order.samples_per_pixel.or(target.is_some().then_some(1));

@@ -157,6 +157,7 @@ impl Works for Workshop {
         let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
         let mut accuracy = Vec::new();
         for (name, path) in [
+            ("picture-de2000", "/picture_error/delta_e_2000"),
             ("sampling-mean-de2000", "/rendering/sampling/mean_delta_e"),
             ("sampling-p95-de2000", "/rendering/sampling/p95_delta_e"),
             ("sampling-flip", "/rendering/sampling/flip_between_drawings"),

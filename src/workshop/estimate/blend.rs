@@ -59,6 +59,9 @@ fn sizes(paints: usize, profile: &Profile) -> Sizes {
 /// Angles of samples of more slices than are compared.
 const MANY_ANGLES: Sizes = [9, 14];
 
+const CANONICAL: &str = "three and more paints are joined in the order of their contents' hashes, which a sample of them does not have: \
+                         it is measured when they are blended, or estimated with order=sampled or order=cheapest";
+
 /// Where a blend goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kept {
@@ -132,9 +135,14 @@ fn of_samples(
     let clusters = error.terms.iter().find(|term| term.what == "clusters");
     // The canonical order is that of the whole paints' hashes, which samples of them do not have.
     let joined_alike = sampled.len() < 3 || profile.blend.order != Order::Canonical;
+    let known = if joined_alike {
+        EstimatedError::lab(&error)
+    } else {
+        EstimatedError::not_known("Lab", CANONICAL)
+    };
     let error = EstimatedError {
         at_least: clusters.and_then(|term| term.lab),
-        ..EstimatedError::lab(error.lab.filter(|_| joined_alike))
+        ..known
     };
     Ok(Estimate::new(profile, stages, bytes, error))
 }

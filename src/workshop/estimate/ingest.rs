@@ -8,7 +8,7 @@ use super::{
     step_for, this_machine, timed, wanted_on, write_stage,
 };
 use crate::accuracy::{
-    Profile, clustering_error, left_out_seen, left_out_w1, paint_error, predicted_clustering_error,
+    Profile, clustering_error, left_out_w1, paint_error, predicted_clustering_error, seen_between,
 };
 use crate::fit::{ClusterSettings, FittedFlakes, Thinned, fit_flakes};
 use crate::measurement::{FlakePictures, PackageBase};
@@ -48,7 +48,7 @@ pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, 
     let bytes = extrapolated(size(small)?, size(large)?, whole);
     let mut stages = sampled.stages;
     stages.extend(write_stage(bytes));
-    let error = EstimatedError::lab(paint_error(large).lab);
+    let error = EstimatedError::lab(&paint_error(large));
     Ok(Estimate::new(&options.profile, stages, bytes, error))
 }
 
@@ -137,7 +137,7 @@ pub(super) fn of_paint(paint: PaintFile, profile: &Profile, sizes: Sizes, second
             let kept = flakes.thinned(step);
             (
                 left_out_w1(flakes, step),
-                left_out_seen(&paint.paint, &kept),
+                seen_between(&paint.paint, flakes, &kept),
             )
         })
     });

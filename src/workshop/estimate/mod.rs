@@ -28,7 +28,7 @@ pub use preview::{PictureWork, SmallPictures, estimate_preview};
 pub use realise::{estimate_bundle, estimate_realise};
 pub use work::Work;
 
-use crate::accuracy::Profile;
+use crate::accuracy::{PictureError, Profile, ResultError};
 
 /// What a request will cost.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -60,12 +60,14 @@ pub struct Stage {
 /// An error to expect.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
 pub struct EstimatedError {
-    /// How much; null where it is not known, as of a paint that was not clustered here, or of three and more paints in the
-    /// canonical order.
+    /// How much; null where it is not known.
     pub value: Option<f64>,
-    /// Of what: `Lab`, misplaced colors of flakes; or `CIEDE2000`, what a picture's samples leave to chance, mean over its
-    /// pixels. How far off the paint in the picture is, the paint tells itself.
+    /// Of what: `Lab`, misplaced colors of flakes; or `CIEDE2000` of a picture, in the mean: what its samples leave to
+    /// chance, and how far off the paint in it is.
     pub unit: &'static str,
+    /// Why there is no value, where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unknown: Option<&'static str>,
     /// What it will be at least, in the same unit, where `value` is of a sample and a part of it is known already as it
     /// will be measured.
     #[serde(skip)]
@@ -73,10 +75,30 @@ pub struct EstimatedError {
 }
 
 impl EstimatedError {
-    fn lab(value: Option<f64>) -> Self {
+    pub(super) fn lab(of: &ResultError) -> Self {
+        Self {
+            value: of.lab,
+            unknown: of.unknown(),
+            unit: "Lab",
+            at_least: None,
+        }
+    }
+
+    fn of_picture(of: &PictureError) -> Self {
+        let value = of.delta_e_2000;
         Self {
             value,
-            unit: "Lab",
+            unknown: value.is_none().then_some(of.how),
+            unit: "CIEDE2000",
+            at_least: None,
+        }
+    }
+
+    const fn not_known(unit: &'static str, why: &'static str) -> Self {
+        Self {
+            value: None,
+            unknown: Some(why),
+            unit,
             at_least: None,
         }
     }

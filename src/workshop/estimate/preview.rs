@@ -1,10 +1,10 @@
 //! Estimates of a picture.
 
 use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, timed, write_stage};
-use crate::accuracy::Profile;
+use crate::accuracy::{PictureError, Profile};
 use crate::blend::RealisationWeights;
 use crate::paint::Limits;
-use crate::workshop::previewing::{PictureFormat, PreviewOptions, preview, sampling};
+use crate::workshop::previewing::{PictureFormat, PreviewOptions, picture_error, preview};
 use crate::workshop::realising::Made;
 use crate::workshop::{Lap, Thing, WorkshopError};
 
@@ -98,13 +98,13 @@ impl SmallPictures {
         self.drawn.first().map_or(0.0, |first| first.seconds)
     }
 
-    /// What the picture takes, with its error where that is known.
+    /// What the picture takes, with its error.
     #[must_use]
     pub fn estimate(
         &self,
         work: &PictureWork<'_>,
         profile: &Profile,
-        error: Option<f64>,
+        error: &PictureError,
     ) -> Estimate {
         let options = work.with(profile.samples_per_pixel);
         let (seconds, bytes) = self.tell(options.size, options.samples_per_pixel);
@@ -112,11 +112,7 @@ impl SmallPictures {
         if work.written {
             stages.extend(write_stage(bytes));
         }
-        let error = EstimatedError {
-            value: error,
-            unit: "CIEDE2000",
-            at_least: None,
-        };
+        let error = EstimatedError::of_picture(error);
         let drawn_with = Profile {
             samples_per_pixel: options.samples_per_pixel,
             ..*profile
@@ -233,18 +229,17 @@ impl PictureWork<'_> {
         }
     }
 
-    /// What so many samples per pixel leave to chance, CIEDE2000, mean over the pixels.
+    /// Error of the picture with so many samples per pixel; angles have none.
     ///
     /// # Errors
     ///
     /// What [`preview`] refuses.
-    pub fn error_of(&self, samples_per_pixel: u32) -> Result<f64, WorkshopError> {
+    pub fn error_of(&self, samples_per_pixel: u32) -> Result<PictureError, WorkshopError> {
         if !self.options.show.is_paint() {
-            return Ok(0.0);
+            return Ok(PictureError::none());
         }
         let options = self.with(samples_per_pixel);
-        let error = sampling(self.thing, self.weights, &options, self.limits)?;
-        Ok(error.mean_delta_e)
+        picture_error(self.thing, self.weights, &options, self.limits)
     }
 
     fn draw(&self, options: &PreviewOptions) -> Result<Made, WorkshopError> {
@@ -274,7 +269,7 @@ pub fn estimate_preview(
         SmallPictures::draw(work, 1, &SIDES_OF_ANGLES, |of| timed(|| work.draw(&of)))?
     };
     let error = work.error_of(samples)?;
-    Ok(small.estimate(work, profile, Some(error)))
+    Ok(small.estimate(work, profile, &error))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::{
     Estimate, EstimatedError, Stage, extrapolated, shortest, step_for, timed, write_stage,
 };
-use crate::accuracy::{Profile, bundle_error};
+use crate::accuracy::{Profile, ResultError, bundle_error};
 use crate::blend::{Blend, RealisationWeights};
 use crate::paint::{CarPaint, Flakes, PaintFile};
 use crate::workshop::bundling::bundle_blend;
@@ -30,7 +30,7 @@ pub fn estimate_realise(
 ) -> Result<Estimate, WorkshopError> {
     let make = |sample: &Thing| realise(sample, weights, format, profile);
     let error = error_as_written(thing, weights, format, &profile.export)?;
-    of_file(thing, profile, written, error, &make)
+    of_file(thing, profile, written, &error, &make)
 }
 
 /// What writing the bundle of a whole blend will take; opening it not included.
@@ -44,11 +44,14 @@ pub fn estimate_bundle(
     written: bool,
 ) -> Result<Estimate, WorkshopError> {
     let make = |sample: &Thing| bundle_blend(sample, profile);
-    let error = match thing {
-        Thing::Blend(blend) => bundle_error(blend, &profile.export).lab,
-        Thing::Paint(_) => None,
+    let Thing::Blend(blend) = thing else {
+        // It says why.
+        return Err(make(thing)
+            .err()
+            .unwrap_or_else(|| WorkshopError::internal("a paint was bundled")));
     };
-    of_file(thing, profile, written, error, &make)
+    let error = bundle_error(blend, &profile.export);
+    of_file(thing, profile, written, &error, &make)
 }
 
 /// What `make` will take on the whole, by what it takes on two samples; the error is of the whole, for its range says how
@@ -57,7 +60,7 @@ fn of_file(
     thing: &Thing,
     profile: &Profile,
     written: bool,
-    error: Option<f64>,
+    error: &ResultError,
     make: &dyn Fn(&Thing) -> Result<Made, WorkshopError>,
 ) -> Result<Estimate, WorkshopError> {
     let whole = slices(thing);

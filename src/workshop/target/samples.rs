@@ -1,6 +1,7 @@
 //! How many samples per pixel meet a target: any number will do, so it is reckoned and then checked.
 //!
-//! Time follows from a few small pictures. The error of chance falls about as one over the root of the samples: it is
+//! How far off the paint is, no number of samples mends: chance may take what that leaves of the error allowed. Time follows
+//! from a few small pictures. The error of chance falls about as one over the root of the samples: it is
 //! measured on a lattice of pixels, the number that should do follows, and is measured in turn.
 
 use super::{Picked, Search, Target};
@@ -44,8 +45,7 @@ pub(super) fn pick_samples(
     let mut tried = 1;
     let mut measure = |samples: u32| {
         tried += 1;
-        let error = picture.error_of(samples)?;
-        Ok::<_, WorkshopError>(Measured { samples, error })
+        picture.error_of(samples)
     };
     // Most that are drawn in what is left of the time, if something else takes so many seconds before.
     let in_time = |before: f64| {
@@ -75,17 +75,32 @@ pub(super) fn pick_samples(
             let told = TOLD_PIXELS / (width * height).max(1) as f64;
             let telling = small.seconds(picture, in_time(0.0).max(1)) * told.min(1.0);
             let samples = in_time(small.least_seconds() + telling).max(1);
-            (samples, Some(picture.error_of(samples)?))
+            (samples, picture.error_of(samples)?)
         }
         Some(allowed) => {
             let begun = search.seconds();
-            let first = measure(few)?;
+            let of_few = measure(few)?;
+            let first = Measured {
+                samples: few,
+                error: of_few.samples,
+            };
+            // What the paint itself leaves of it; where that is nothing, samples are to do their part all the same.
+            let for_chance = allowed - of_few.paint.unwrap_or(0.0);
+            let for_chance = if for_chance > 0.0 {
+                for_chance
+            } else {
+                allowed
+            };
             let seconds_a_sample = (search.seconds() - begun) / f64::from(few);
             // What leaves no time for a picture of as many samples is not measured.
-            let wanted = samples_for(allowed, first, most, &mut |samples| {
+            let wanted = samples_for(for_chance, first, most, &mut |samples| {
                 let takes = seconds_a_sample * f64::from(samples);
                 let worth_it = samples <= in_time(takes);
-                worth_it.then(|| measure(samples)).transpose()
+                let of = worth_it.then(|| measure(samples)).transpose()?;
+                Ok(of.map(|of| Measured {
+                    samples,
+                    error: of.samples,
+                }))
             })?;
             let left = in_time(0.0).max(1);
             let chosen = if wanted.samples <= left {
@@ -93,14 +108,14 @@ pub(super) fn pick_samples(
             } else {
                 scaled(first, left)
             };
-            (chosen.samples, Some(chosen.error))
+            (chosen.samples, of_few.with_samples(chosen.error))
         }
     };
     let profile = Profile {
         samples_per_pixel: samples,
         ..Profile::standard()
     };
-    let estimate = small.estimate(picture, &profile, error);
+    let estimate = small.estimate(picture, &profile, &error);
     Ok(target.picked(estimate, tried, search.seconds()))
 }
 

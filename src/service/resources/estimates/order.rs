@@ -51,7 +51,7 @@ pub struct EstimateOrder {
     /// Accuracy: the name of a preset, or an object of knobs.
     #[schema(value_type = Option<ProfileDocument>)]
     pub profile: Option<ProfileText>,
-    /// In place of a profile: the cheapest whose error is at most this; of a picture, what its samples leave to chance.
+    /// In place of a profile: the cheapest whose error is at most this: Lab, of a picture CIEDE2000 in the mean.
     #[schema(exclusive_minimum = 0.0)]
     pub max_error: Option<f64>,
     /// In place of a profile: the most accurate that is done in so many seconds here.

@@ -1,10 +1,10 @@
-//! What a paint loses when every k-th angle of its slices is kept.
+//! What a paint loses with fewer angles, or with fewer clusters in its slices.
 
 use rayon::prelude::*;
 
 use super::geometries::{Geometry, geometries, slices_at};
 use super::seen::{Noticed, Seen};
-use crate::paint::{CarPaint, Flakes, LeftOutSeen, LightnessMixture, Percentiles};
+use crate::paint::{CarPaint, Flakes, LightnessMixture, Percentiles, SeenDifference};
 
 /// Most slices that are compared.
 const CHECKED: usize = 64;
@@ -42,11 +42,21 @@ pub fn left_out_w1(flakes: &Flakes, step: usize) -> Percentiles {
     Percentiles::of(distances)
 }
 
-/// What keeping no more than these of a paint's flakes changes at the six instrument geometries: each is a mixture of
-/// other slices then. `None` for a solid color.
+/// Distance W1 of the lightnesses between slices and the same slices with fewer clusters, Lab units, on at most 64 spread
+/// evenly over them.
 #[must_use]
-pub fn left_out_seen(paint: &CarPaint, kept: &Flakes) -> Option<LeftOutSeen> {
-    let flakes = paint.flakes.as_ref()?;
+pub fn reduced_w1(flakes: &Flakes, reduced: &Flakes) -> Percentiles {
+    let stride = flakes.slices().div_ceil(CHECKED).max(1);
+    let all = |of: &Flakes, k: usize| LightnessMixture::of(&[(1.0, of.slice_at(k))]);
+    let checked = (0..flakes.slices()).into_par_iter().step_by(stride);
+    let distances = checked.map(|k| all(flakes, k).distance(&all(reduced, k)));
+    Percentiles::of(distances.collect())
+}
+
+/// What taking the latter flakes for the former changes at the six instrument geometries, over the base of a paint: with
+/// fewer angles each is a mixture of other slices. `None` where the base tells nothing at one of them.
+#[must_use]
+pub fn seen_between(base: &CarPaint, own: &Flakes, taken: &Flakes) -> Option<SeenDifference> {
     let at = |geometry: &Geometry, flakes: &Flakes| {
         let met = geometry.slices(&flakes.theta_h, &flakes.theta_d);
         let parts: Vec<_> = met
@@ -55,15 +65,15 @@ pub fn left_out_seen(paint: &CarPaint, kept: &Flakes) -> Option<LeftOutSeen> {
             .collect();
         Seen::of(geometry, &parts)
     };
-    let noticed: Vec<Noticed> = geometries(paint)
+    let noticed: Vec<Noticed> = geometries(base)
         .iter()
-        .map(|geometry| at(geometry, kept).beside(&at(geometry, flakes)))
+        .map(|geometry| at(geometry, taken).beside(&at(geometry, own)))
         .collect();
     let of = |get: fn(&Noticed) -> f64| -> Option<[f64; 6]> {
         let all: Vec<f64> = noticed.iter().map(get).collect();
         all.try_into().ok()
     };
-    Some(LeftOutSeen {
+    Some(SeenDifference {
         delta_e_2000: of(|own| own.delta_e_2000)?,
         sparkle: of(|own| own.sparkle)?,
         lit: of(|own| own.lit)?,
@@ -110,6 +120,20 @@ mod tests {
     }
 
     #[test]
+    fn a_slice_with_one_cluster_for_two_has_moved_by_half_their_way() {
+        let mut two = flakes([30.0; 5]);
+        two.offsets = vec![0, 2, 3, 4, 5, 6].into();
+        two.probability = vec![0.5, 0.5, 1.0, 1.0, 1.0, 1.0].into();
+        two.lower.insert(0, [20.0, 0.0, 0.0]);
+        two.upper.insert(0, [21.0, 0.0, 0.0]);
+        let one = flakes([25.0, 30.0, 30.0, 30.0, 30.0]);
+        let w1 = reduced_w1(&two, &one);
+        // Halves of 25..26 go to 20..21 and to 30..31, by 4.75 each in the mean of what crosses.
+        assert!((w1.worst - 4.75).abs() < 1e-6, "{w1:?}");
+        assert_eq!(reduced_w1(&two, &two).worst, 0.0);
+    }
+
+    #[test]
     fn the_geometries_that_lose_their_slice_are_told_and_no_others() {
         // Light at 45 degrees: θh of -15° aspecular is 7.5, of 110° it is 55 degrees.
         let paint = |lightness| CarPaint {
@@ -121,8 +145,8 @@ mod tests {
         };
         let seen = |lightness| {
             let paint = paint(lightness);
-            let kept = paint.flakes.as_ref().expect("flakes").thinned(2);
-            let seen = left_out_seen(&paint, &kept).expect("flakes");
+            let own = paint.flakes.as_ref().expect("flakes");
+            let seen = seen_between(&paint, own, &own.thinned(2)).expect("six geometries");
             [seen.delta_e_2000, seen.sparkle, seen.lit]
         };
         let none = |off: f64| off < 1e-9;
