@@ -6,6 +6,8 @@
 //! two. The tilts widen the lobe by a few percent, which the loss report states. What a viewer shows is a likeness: the statistics themselves
 //! travel beside it.
 
+use std::sync::LazyLock;
+
 use image::ExtendedColorType;
 
 use super::brdf::GltfMaterial;
@@ -120,7 +122,7 @@ pub(super) fn bake(
         }
     }
     let peak = all.iter().flat_map(|f| f.f0).fold(1e-6_f32, f32::max);
-    let curve = SrgbCurve::new();
+    let curve = &*CURVE;
     let mut sum = [0.0; 3];
     let colors: Vec<[u8; 3]> = all
         .iter()
@@ -298,6 +300,8 @@ fn tilted(cell: u32, slope: f64) -> [f32; 3] {
     #[allow(clippy::cast_possible_truncation)] // becomes a byte
     [x, y, 1.0].map(|v| (v / length) as f32)
 }
+
+static CURVE: LazyLock<SrgbCurve> = LazyLock::new(SrgbCurve::new);
 
 /// The sRGB transfer curve by table, both ways (IEC 61966-2-1).
 struct SrgbCurve {

@@ -104,22 +104,33 @@ impl GltfMaterial {
 
     /// BRDF at known cosines where a texel's F0 is `f0`, at most 1.
     pub(super) fn at_texel(&self, c: &Cosines, f0: LinearRgb) -> LinearRgb {
+        self.under_film(c, f0, self.film(c, f0))
+    }
+
+    /// What its film reflects over a dielectric base; `None` without one.
+    pub(super) fn film(&self, c: &Cosines, f0: LinearRgb) -> Option<LinearRgb> {
+        let (ior, thickness) = (self.iridescence_ior, self.iridescence_thickness_nm);
+        let is_there = self.iridescence > 0.0 && thickness > 0.0;
+        is_there.then(|| thin_film(ior, thickness, c.n_v, f0.map(|f| self.specular * f)))
+    }
+
+    /// The same where it is known what the [film](Self::film) reflects.
+    pub(super) fn under_film(
+        &self,
+        c: &Cosines,
+        f0: LinearRgb,
+        film: Option<LinearRgb>,
+    ) -> LinearRgb {
         let lobe = specular(self.roughness * self.roughness, c);
         let grazing = (1.0 - c.v_h).max(0.0).powi(5);
         let mut fr = f0.map(|f| self.specular * (f + (1.0 - f) * grazing));
         let mut conductor = self.base_color.map(|f| f + (1.0 - f) * grazing);
-        if self.iridescence > 0.0 && self.iridescence_thickness_nm > 0.0 {
-            let film = |f0| {
-                thin_film(
-                    self.iridescence_ior,
-                    self.iridescence_thickness_nm,
-                    c.n_v,
-                    f0,
-                )
-            };
-            fr = mix(fr, film(f0.map(|f| self.specular * f)), self.iridescence);
+        if let Some(film) = film {
+            fr = mix(fr, film, self.iridescence);
             if self.metallic > 0.0 {
-                conductor = mix(conductor, film(self.base_color), self.iridescence);
+                let (ior, thickness) = (self.iridescence_ior, self.iridescence_thickness_nm);
+                let film = thin_film(ior, thickness, c.n_v, self.base_color);
+                conductor = mix(conductor, film, self.iridescence);
             }
         }
         let below = 1.0 - fr[0].max(fr[1]).max(fr[2]);
@@ -187,8 +198,7 @@ pub(super) fn thin_film(ior: f64, thickness_nm: f64, cosine: f64, f0: LinearRgb)
     }
     let mut sum = single.map(|s| first + s);
     let mut cm = single.map(|s| s - through);
-    for order in [1.0, 2.0] {
-        let color = sensitivity(order * path, phase.map(|p| order * p));
+    for color in sensitivities(path, phase) {
         for k in 0..3 {
             cm[k] *= amplitude[k];
             sum[k] += cm[k] * 2.0 * color[k];
@@ -197,23 +207,30 @@ pub(super) fn thin_film(ior: f64, thickness_nm: f64, cosine: f64, f0: LinearRgb)
     sum.map(|v| v.max(0.0))
 }
 
-/// Fourier transform of the color matching functions, Gaussians each (Belcour and Barla 2017), in linear sRGB.
+/// Fourier transform of the color matching functions, Gaussians each (Belcour and Barla 2017), in linear sRGB, at a path
+/// and at twice the path and shift: of an angle and its double one cosine is enough, of a square and its fourfold one
+/// exponential.
 ///
 /// The shift is given per channel of the result, as the extension has it, though it enters as XYZ.
-fn sensitivity(path_nm: f64, shift: [f64; 3]) -> LinearRgb {
+fn sensitivities(path_nm: f64, shift: [f64; 3]) -> [LinearRgb; 2] {
     let phase = 2.0 * PI * path_nm * 1e-9;
-    let bump = |height: f64, position: f64, variance: f64, shift: f64| {
-        height
-            * (2.0 * PI * variance).sqrt()
-            * (position * phase + shift).cos()
-            * (-phase * phase * variance).exp()
+    let bumps = |height: f64, position: f64, variance: f64, shift: f64| {
+        let scale = height * (2.0 * PI * variance).sqrt();
+        let cosine = (position * phase + shift).cos();
+        let fall = (-phase * phase * variance).exp();
+        [
+            scale * cosine * fall,
+            scale * (2.0 * cosine * cosine - 1.0) * fall.powi(4),
+        ]
     };
-    let x = bump(5.4856e-13, 1.6810e6, 4.3278e9, shift[0])
-        + bump(9.7470e-14, 2.2399e6, 4.5282e9, shift[0]);
-    let y = bump(4.4201e-13, 1.7953e6, 9.3046e9, shift[1]);
-    let z = bump(5.2481e-13, 2.2084e6, 6.6121e9, shift[2]);
-    let xyz = [x, y, z].map(|v| v / 1.0685e-7);
-    crate::color::xyz_to_rgb(xyz)
+    let x = bumps(5.4856e-13, 1.6810e6, 4.3278e9, shift[0]);
+    let x_blue = bumps(9.7470e-14, 2.2399e6, 4.5282e9, shift[0]);
+    let y = bumps(4.4201e-13, 1.7953e6, 9.3046e9, shift[1]);
+    let z = bumps(5.2481e-13, 2.2084e6, 6.6121e9, shift[2]);
+    [0, 1].map(|order| {
+        let xyz = [x[order] + x_blue[order], y[order], z[order]];
+        crate::color::xyz_to_rgb(xyz.map(|v| v / 1.0685e-7))
+    })
 }
 
 #[cfg(test)]

@@ -13,6 +13,8 @@
 mod loss;
 mod targets;
 
+use std::cell::RefCell;
+
 pub use self::loss::LossReport;
 pub(super) use self::loss::loss;
 use self::loss::reflected;
@@ -76,6 +78,40 @@ struct Fitting<'a> {
     /// What is not free.
     fixed: GltfMaterial,
     bounds: Vec<(f64, f64)>,
+    films: RefCell<Films>,
+}
+
+/// What films reflect at the targets: most of a film's residuals. Half of a derivative's columns leave the film
+/// and what is under it as they are, so that the last two are kept.
+#[derive(Default)]
+struct Films {
+    kept: [Option<(FilmKey, Vec<Option<LinearRgb>>)>; 2],
+    last: usize,
+}
+
+/// Index and thickness of a film, and F0 under it.
+type FilmKey = (f64, f64, LinearRgb);
+
+impl Films {
+    fn of(&mut self, material: &GltfMaterial, targets: &[Target]) -> &[Option<LinearRgb>] {
+        let f0 = dielectric_f0(material.ior, material.specular_color);
+        let key = (
+            material.iridescence_ior,
+            material.iridescence_thickness_nm,
+            f0,
+        );
+        let known = |kept: &Option<(FilmKey, _)>| kept.as_ref().is_some_and(|(own, _)| *own == key);
+        if let Some(place) = self.kept.iter().position(known) {
+            self.last = place;
+        } else {
+            self.last = 1 - self.last;
+            let films = targets.iter().map(|t| material.film(&t.cosines, f0));
+            self.kept[self.last] = Some((key, films.collect()));
+        }
+        self.kept[self.last]
+            .as_ref()
+            .map_or(&[], |(_, films)| films)
+    }
 }
 
 /// Shares of the channels in a color, none of them for black.
@@ -100,11 +136,12 @@ enum Layout {
 impl Problem for Fitting<'_> {
     fn residuals(&self, x: &[f64], out: &mut Vec<f64>) {
         let material = self.material(x);
+        let f0 = dielectric_f0(material.ior, material.specular_color);
+        let mut films = self.films.borrow_mut();
         out.clear();
-        for t in self.targets {
-            let difference = t
-                .metric
-                .difference(t.lab, reflected(material.at(&t.cosines)));
+        for (t, film) in self.targets.iter().zip(films.of(&material, self.targets)) {
+            let shown = reflected(material.under_film(&t.cosines, f0, *film));
+            let difference = t.metric.difference(t.lab, shown);
             out.extend(difference.map(|d| d * t.weight.sqrt()));
         }
         let base = chromaticity(material.base_color);
@@ -137,6 +174,7 @@ impl<'a> Fitting<'a> {
             layout,
             fixed,
             bounds,
+            films: RefCell::default(),
         }
     }
 
