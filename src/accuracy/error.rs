@@ -15,7 +15,7 @@
 //! measured at weights within the paints, and told of no others.
 //!
 //! The reference profile's transport and files have none but the first. A realisation outside the paints multiplies
-//! the first two by the sum of the weights' sizes.
+//! what a blend has by the sum of the weights' sizes.
 
 mod picture;
 mod seen;
@@ -42,7 +42,7 @@ pub struct ResultError {
     pub terms: Vec<Term>,
     /// What would be noticed of it; null where a step was not measured.
     pub seen: Option<SeenError>,
-    /// Why that is null.
+    /// Why `seen` is null.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unseen: Option<&'static str>,
 }
@@ -96,11 +96,14 @@ impl ResultError {
         self.seen.ok_or(self.unseen.unwrap_or(NOT_MEASURED))
     }
 
-    /// The same beyond the paints: every term times the sum of the weights' sizes, at least 1; what would be seen was not
-    /// measured there.
+    /// The same beyond the paints: every term times the sum of the flakes' weights' sizes, at least 1; what would be seen was
+    /// not measured there, nor over a base beyond the paints. A solid color stays exact.
     #[must_use]
-    pub fn stretched(&self, sum_of_sizes: f64) -> Self {
-        let by = sum_of_sizes.max(1.0);
+    pub fn stretched(&self, [flakes, base]: [f64; 2]) -> Self {
+        if self.terms.is_empty() {
+            return self.clone();
+        }
+        let by = flakes.max(1.0);
         Self::of(
             self.terms
                 .iter()
@@ -109,7 +112,7 @@ impl ResultError {
                     ..*term
                 })
                 .collect(),
-            if by <= 1.0 + WITHIN {
+            if by.max(base) <= 1.0 + WITHIN {
                 self.seen_or_why()
             } else {
                 Err(BEYOND)
@@ -124,8 +127,7 @@ const WITHIN: f64 = 1e-9;
 const CLUSTERS: &str = "measured: W1 of lightness between pixels and clusters, nine of ten of the compared slices are within; \
                         of several paints the worst";
 const REALISED: &str = "bounded: error of the blend that a paint was realised from, where it is worse than what was measured of the others";
-const UNKNOWN: &str =
-    "not known: the paint was not clustered here from pictures, or is of an older version";
+const UNKNOWN: &str = "the paint was not clustered here from pictures, or is of an older version";
 const REDUCTION: &str = "measured: W1 of lightness between slices and the same slices with fewer clusters, nine of ten of the \
                          compared slices are within; of several paints the worst";
 const TRANSPORT: &str = "bounded: mean excess of the plans' cost over the dual bound; of several pairs of paints the worst";
@@ -138,6 +140,7 @@ const ROUNDING_OF_ALL: &str =
 const ROUNDING: &str = "bounded: W1 between the boxes and the boxes read back, worst of the slices at the instrument geometries";
 
 const NOT_MEASURED: &str = "a step was not measured: a paint was not clustered here from pictures, or is of an older version";
+const REALISED_UNSEEN: &str = "a paint was realised from a blend where this was not measured: beyond its paints, or by an older version";
 const BEYOND: &str =
     "it is measured within the paints; these weights, or this saturation, lead beyond them";
 const OTHER_MATERIAL: &str =
@@ -154,7 +157,7 @@ pub fn paint_error(file: &PaintFile) -> ResultError {
     let clustering = file.clustering.as_ref();
     ResultError::of(
         vec![clusters([clustering].into_iter())],
-        SeenError::of_clusters(clustering).ok_or(NOT_MEASURED),
+        SeenError::of_clusters(clustering),
     )
 }
 
@@ -204,9 +207,13 @@ pub fn blend_error(blend: &Blend) -> ResultError {
         }));
     }
     let each = with_flakes.map(|(_, clustering)| SeenError::of_clusters(clustering));
-    let seen = each.reduce(|x, y| Some(x?.or_worse(y?))).flatten();
-    let seen = seen.and_then(|seen| seen.and_transport(&report.against_exact));
-    ResultError::of(terms, seen.ok_or(NOT_MEASURED))
+    let seen = each.reduce(|x, y| Ok(x?.or_worse(y?)));
+    let seen = seen.unwrap_or(Err(NOT_MEASURED));
+    let seen = seen.and_then(|seen| {
+        seen.and_transport(&report.against_exact)
+            .ok_or(NOT_MEASURED)
+    });
+    ResultError::of(terms, seen)
 }
 
 /// Error of a file written from a paint or a blend of this error.
@@ -233,8 +240,15 @@ pub fn bundle_error(blend: &Blend, settings: &ExportSettings) -> ResultError {
         how: ROUNDING_OF_ALL,
     });
     let of = blend_error(blend);
+    let is_rounded = rounding.is_some_and(|term| term.lab != Some(0.0));
     let terms = of.terms.iter().copied().chain(rounding);
-    let seen = of.seen_or_why().and(Err(AT_ANY_WEIGHTS));
+    let seen = of.seen_or_why().and_then(|seen| {
+        if is_rounded {
+            Err(AT_ANY_WEIGHTS)
+        } else {
+            Ok(seen)
+        }
+    });
     ResultError::of(terms.collect(), seen)
 }
 

@@ -102,7 +102,7 @@ enum What {
         /// A panorama to light it with, .hdr or .exr, in place of the built-in studio.
         #[arg(long, value_name = "FILE")]
         environment: Option<PathBuf>,
-        /// Samples per pixel, in place of the profile's.
+        /// Samples per pixel, in place of the preset's.
         #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true,
             conflicts_with_all = ["max_error", "max_seconds"])]
         spp: Option<u32>,
@@ -175,7 +175,7 @@ impl Estimate {
     ) -> Result<Estimated, WorkshopError> {
         let of = |work: &Work<'_>| match args.pick(work)? {
             Some(picked) => {
-                eprintln!("target {}", picked.line());
+                eprintln!("target {}", picked.told());
                 Ok(picked.estimate)
             }
             None => work.estimate(&options.profile),
@@ -265,7 +265,7 @@ impl Estimate {
                 });
                 let estimate = match args.pick(&work)? {
                     Some(picked) => {
-                        eprintln!("target {}", picked.line());
+                        eprintln!("target {}", picked.told());
                         picked.estimate
                     }
                     None => work.estimate(&profile)?,

@@ -59,7 +59,7 @@ pub fn clamped(clamps: &[Clamp]) {
 /// What was picked for a target, and what the user should know.
 pub fn notes(picked: Option<&Picked>, notes: &[String]) {
     if let Some(picked) = picked {
-        eprintln!("target {}", picked.line());
+        eprintln!("target {}", picked.told());
     }
     for note in notes {
         eprintln!("note: {note}");

@@ -36,7 +36,7 @@ pub struct Preview {
         allow_hyphen_values = true
     )]
     show: ShowName,
-    /// Samples per pixel, in place of the profile's.
+    /// Samples per pixel, in place of the preset's.
     #[arg(long, value_name = "N", value_parser = whole(1..=4096_u32), allow_hyphen_values = true,
         conflicts_with_all = ["max_error", "max_seconds"])]
     spp: Option<u32>,
@@ -228,7 +228,7 @@ impl Preview {
         drop(progress);
         if let Some(picked) = &picked {
             // Before the wait, not after it.
-            eprintln!("target {}", picked.line());
+            eprintln!("target {}", picked.told());
             wanted.samples_per_pixel = picked.profile().samples_per_pixel;
         }
         if picked.is_some() {
@@ -266,14 +266,15 @@ impl Preview {
 
 /// Error of a picture of a paint, for people.
 fn error_told(report: &serde_json::Value) -> String {
-    let number = |name: &str| report.pointer(&format!("/picture_error/{name}"))?.as_f64();
-    match (number("samples"), number("paint")) {
-        (Some(samples), Some(paint)) => format!(
-            ", off by CIEDE2000 {:.2} in the mean: samples leave {samples:.2} to chance, {paint:.2} is the paint's",
-            samples + paint
+    let error = &report["picture_error"];
+    let number = |name: &str| error[name].as_f64();
+    match (number("delta_e_2000"), number("samples"), number("paint")) {
+        (Some(all), Some(samples), Some(paint)) => format!(
+            ", off by CIEDE2000 {all:.2} in the mean: samples leave {samples:.2} to chance, {paint:.2} is the paint's"
         ),
-        (Some(samples), None) => format!(
-            ", samples leave CIEDE2000 {samples:.2} to chance in the mean; how far off the paint is, is not known"
+        (_, Some(samples), _) => format!(
+            ", samples leave CIEDE2000 {samples:.2} to chance in the mean; how far off the paint is, is not known: {}",
+            error["how"].as_str().unwrap_or_default()
         ),
         _ => String::new(),
     }

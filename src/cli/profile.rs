@@ -9,7 +9,7 @@ use crate::accuracy::{Knobs, Profile, ProfileError};
 use crate::paint::Limits;
 use crate::workshop::{Picked, Target, Work, WorkshopError, read};
 
-/// The profile, by name, by file and by knobs; later ones win.
+/// The profile, by name or by file, with knobs turned in place of its own; a knob turned twice is refused.
 #[derive(Args, Clone, Debug, Default)]
 pub struct ProfileArgs {
     /// Accuracy profile: draft, standard, reference, or a JSON file of knobs.

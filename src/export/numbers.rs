@@ -116,7 +116,7 @@ pub(super) const REPORT: &[Number] = &[
     ("report.correspondence.reduced[].to", "1", (1.0, ANY), "clusters of its widest slice after"),
     ("report.accuracy.error.lab", "CIELAB", (0.0, ANY), "distance by which the flakes are misplaced, against the pixels and exact transport: sum of the terms, of which that of clusters is along lightness; null where one is not known"),
     ("report.accuracy.error.terms[].lab", "CIELAB", (0.0, ANY), "one term of it, null where it is not known; `how` says how it is"),
-    ("report.accuracy.error.seen.aspecular_deg[]", "degree", (-90.0, 180.0), "aspecular angles of the instrument geometries, light at 45 degrees; `seen` is null where a step was not measured"),
+    ("report.accuracy.error.seen.aspecular_deg[]", "degree", (-90.0, 180.0), "aspecular angles of the instrument geometries, light at 45 degrees; `seen` is null where that was not measured, and `unseen` says why"),
     ("report.accuracy.error.seen.delta_e_2000[]", "CIEDE2000", (0.0, ANY), "error of the mean color there, added up over the steps; `how` says which"),
     ("report.accuracy.error.seen.lit[]", "1", (0.0, ANY), "relative error of how many flakes are lit there, fewer than one texel in a thousand counted as that many"),
     ("report.accuracy.error.seen.sparkle", "1", (0.0, ANY), "relative error of the 99.9th percentile of the flakes' luminance"),

@@ -11,7 +11,7 @@
 //! `m³ + 3m·var`, wholly below it is linear: both exact, and what nearly every box takes. Only a box across the knee
 //! needs the integrals, and where it is also thin the differences cancel: there 4-point Gauss is used.
 
-use crate::color::{D65_2, KNEE, LinearRgb, expand, rgb_to_xyz, xyz_to_rgb};
+use crate::color::{D65_2, KNEE, LinearRgb, compress, expand, rgb_to_xyz, xyz_to_rgb};
 
 /// Half width below which differences of P2 lose more than Gauss quadrature does.
 const THIN: f64 = 2e-3;
@@ -65,7 +65,7 @@ fn middle_of_mean(t: f64, ds: f64, dt: f64, near: f64) -> f64 {
     }
     // The compression's inverse is convex and above its own tangent at the knee: its mean over a box is at least its
     // value in the middle and at most its value at the upper end.
-    let value = if t > KNEE.powi(3) { t.cbrt() } else { dark };
+    let value = compress(t);
     let (mut low, mut high) = (value - reach, value);
     let tolerance = 2.0 * f64::EPSILON * (t.abs() + KNEE.powi(3));
     let mut m = near.clamp(low, high);

@@ -112,39 +112,39 @@ impl Clustering {
         if !(1..=90).contains(&self.angle_step) {
             return refuse("angle_step", &self.angle_step, "1 to 90");
         }
-        for (field, seen) in [
-            ("left_out_seen", &self.left_out_seen),
-            ("realised_seen", &self.realised_seen),
-            ("reduced_seen", &self.reduced_seen),
+        let seen = |seen: &Option<SeenDifference>| -> Vec<f64> {
+            let each = seen.iter();
+            let each = each.flat_map(|seen| [seen.delta_e_2000, seen.sparkle, seen.lit]);
+            each.flatten().collect()
+        };
+        let spread = |of: &Percentiles| vec![of.median, of.p90, of.worst];
+        let w1 = |w1: &Option<Percentiles>| w1.as_ref().map(spread).unwrap_or_default();
+        let measured = self.error.as_ref().map(|error| {
+            let lists = [
+                spread(&error.lightness_w1),
+                spread(&error.mean_luminance),
+                spread(&error.sparkle),
+                error.instrument.to_vec(),
+                error.lit.map(Vec::from).unwrap_or_default(),
+            ];
+            lists.concat()
+        });
+        for (field, figures) in [
+            ("error", measured.unwrap_or_default()),
+            ("realised_lab", self.realised_lab.into_iter().collect()),
+            ("realised_seen", seen(&self.realised_seen)),
+            ("w1_bound", w1(&self.w1_bound)),
+            ("left_out_w1", w1(&self.left_out_w1)),
+            ("left_out_seen", seen(&self.left_out_seen)),
+            ("reduced_w1", w1(&self.reduced_w1)),
+            ("reduced_seen", seen(&self.reduced_seen)),
         ] {
-            let figures = seen
+            let off = figures
                 .iter()
-                .flat_map(|seen| [seen.delta_e_2000, seen.sparkle, seen.lit]);
-            if let Some(off) = figures
-                .flatten()
-                .find(|off| !(*off >= 0.0 && off.is_finite()))
-            {
-                return refuse(field, &off, "0 or more");
+                .find(|off| !(**off >= 0.0 && off.is_finite()));
+            if let Some(off) = off {
+                return refuse(field, off, "0 or more");
             }
-        }
-        for (field, w1) in [
-            ("w1_bound", &self.w1_bound),
-            ("left_out_w1", &self.left_out_w1),
-            ("reduced_w1", &self.reduced_w1),
-        ] {
-            let figures = w1.iter().flat_map(|w1| [w1.p90, w1.worst]);
-            if let Some(off) = figures
-                .into_iter()
-                .find(|off| !(*off >= 0.0 && off.is_finite()))
-            {
-                return refuse(field, &off, "0 or more");
-            }
-        }
-        if let Some(lab) = self
-            .realised_lab
-            .filter(|lab| !(*lab >= 0.0 && lab.is_finite()))
-        {
-            return refuse("realised_lab", &lab, "0 or more, or nothing");
         }
         Ok(())
     }

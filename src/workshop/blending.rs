@@ -92,7 +92,7 @@ struct Ready {
     paint: Option<CarPaint>,
     thinned: Option<Thinning>,
     reduced: Option<Reduction>,
-    /// How its flakes were clustered, and what leaving out angles now costs.
+    /// How its flakes were clustered, and what leaving out angles or clusters now costs.
     clustering: Option<Clustering>,
 }
 

@@ -275,7 +275,8 @@ pub(super) fn error_of(thing: &Thing, weights: Option<&RealisationWeights>) -> R
         (Thing::Blend(blend), Some(weights)) => {
             let size = |weights: &[f64]| weights.iter().map(|w| w.abs()).sum::<f64>();
             let color = size(weights.flake_color()) * weights.flake_saturation.abs();
-            blend_error(blend).stretched(size(weights.flake_lightness()).max(color))
+            let flakes = size(weights.flake_lightness()).max(color);
+            blend_error(blend).stretched([flakes, size(weights.base())])
         }
     }
 }

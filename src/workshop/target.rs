@@ -36,7 +36,8 @@ pub struct Target {
 pub struct Picked {
     /// What was asked for.
     pub target: Target,
-    /// Whether it is met; if not, this is the best that could be done.
+    /// Whether it is met; if not, this is the best that could be done: of a picture whose paint alone is too far off, samples
+    /// as if it were not.
     pub met: bool,
     /// The profile, and what the work will take with it.
     pub estimate: Estimate,
@@ -74,6 +75,16 @@ impl Picked {
     #[must_use]
     pub const fn profile(&self) -> &Profile {
         &self.estimate.knobs
+    }
+
+    /// The same for people, with the reason where the error is not known.
+    #[must_use]
+    pub fn told(&self) -> String {
+        let why = self.estimate.error.unknown;
+        let why = why.map_or(String::new(), |why| {
+            format!(" (its error is not known: {why})")
+        });
+        format!("{}{why}", self.line())
     }
 
     /// In one line.

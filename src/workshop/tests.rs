@@ -5,10 +5,11 @@ use serde_json::Value;
 use super::{
     Format, SAMPLES, Thing, blend_paints, bundle_blend, describe_blend, realise, sample_by_name,
 };
-use crate::accuracy::Profile;
+use crate::accuracy::{Knobs, PictureError, Profile, paint_error};
 use crate::blend::RealisationWeights;
 use crate::export::assert_documented;
-use crate::paint::PaintFile;
+use crate::paint::{Limits, PaintFile};
+use crate::render::{self, Scene, Shape};
 
 fn sample(name: &str, profile: &Profile) -> PaintFile {
     let sample = sample_by_name(name).expect("a sample");
@@ -109,5 +110,27 @@ fn what_is_told_of_each_paint_of_a_blend_follows_the_order_asked_for() {
             assert_eq!(told["paints"][k]["name"], paint.name);
             assert_eq!(told["flakes"]["textures"][k]["grain_um"], texture.grain_um);
         }
+    }
+}
+
+/// Noisy pictures of a right paint, and clear ones of a wrong paint.
+#[test]
+fn a_picture_is_about_as_far_off_as_it_says() {
+    let knobs: Knobs = "angle_step=8".parse().expect("knobs");
+    let coarse = sample("bmw339", &knobs.profile().expect("a profile"));
+    let fine = sample("bmw339", &Profile::standard());
+    let draw = |file: &PaintFile, samples_per_pixel: u32| {
+        let mut scene = Scene::new(Shape::Panel, [24, 24]);
+        scene.samples_per_pixel = samples_per_pixel;
+        render::render(&file.paint, &scene, &Limits::default(), &|_| ()).expect("drawn")
+    };
+    let truth = draw(&fine, 512).film;
+    for (file, samples) in [(&fine, 4), (&coarse, 128)] {
+        let drawn = draw(file, samples);
+        let chance = drawn.report.sampling.mean_delta_e;
+        let told = PictureError::of(chance, &paint_error(file));
+        let told = told.delta_e_2000.expect("known");
+        let ratio = render::difference(&drawn.film, &truth).mean_delta_e / told;
+        assert!((0.2..1.8).contains(&ratio), "{samples}: {ratio} of {told}");
     }
 }

@@ -165,6 +165,12 @@ fn a_picture_is_as_far_off_as_its_samples_and_its_paint_together() {
         drawn("0.5,0.5", &["--max-error", "100"])["picked"]["met"],
         true
     );
+    // Solid colors are exact at any weights.
+    desk.ok(&["blend", "sample:white", "sample:blue", "--out", "s.blend"]);
+    let solid =
+        "preview s.blend --weights -0.5,1.5 --size 24x24 --max-error 100 --json --out p.png";
+    let solid = json(&desk.ok(&solid.split(' ').collect::<Vec<_>>()).stdout);
+    assert_eq!(solid["picked"]["met"], true, "{solid}");
     // Beyond the paints nobody has measured it, and that is said.
     let beyond = drawn("-0.5,1.5", &["--max-error", "100"]);
     let estimated = &beyond["picked"]["estimate"]["error"];
@@ -193,6 +199,10 @@ fn what_is_realised_and_reduced_is_known_to_be_off() {
         shown["error"]["seen"]["delta_e_2000"],
         error["seen"]["delta_e_2000"]
     );
+    made("realise b.blend --weights=-0.5,1.5 --out beyond.paint --json");
+    let beyond = made("show beyond.paint --json");
+    let why = beyond["error"]["unseen"].as_str().expect("a reason");
+    assert!(why.contains("beyond its paints"), "{why}");
     let again = made("blend r.paint sample:bmw339 --knob clusters=12 --out c.blend --json");
     let error = &again["error"];
     let reduction = error["terms"].as_array().expect("terms").iter();

@@ -87,7 +87,11 @@ fn clustering() -> Clustering {
         }),
         error: None,
         realised_lab: Some(0.5),
-        realised_seen: None,
+        realised_seen: Some(SeenDifference {
+            delta_e_2000: [0.5; 6],
+            sparkle: [0.25; 6],
+            lit: [0.125; 6],
+        }),
         reduced_w1: Some(Percentiles::default()),
         reduced_seen: Some(SeenDifference {
             delta_e_2000: [0.5; 6],

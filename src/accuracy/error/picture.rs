@@ -1,7 +1,6 @@
 //! Error of a picture against the picture that the reference profile would give of the same.
 
 use serde::Serialize;
-use utoipa::ToSchema;
 
 use super::ResultError;
 
@@ -11,7 +10,7 @@ use super::ResultError;
 /// sides meets other angles than an instrument does. Of thinned and coarsely clustered paints in the studio, a picture's
 /// difference to the reference's, chance of that one included, was 0.2 to 1.8 times the sum: least where of several
 /// paints another than the worst was drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PictureError {
     /// Sum of both parts, CIEDE2000; null where the paint's is not known.
     pub delta_e_2000: Option<f64>,

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::{NOT_MEASURED, REALISED_UNSEEN};
 use crate::blend::BlendDeviation;
 use crate::paint::{ASPECULAR_DEG, Clustering, SeenDifference};
 
@@ -46,12 +47,16 @@ impl SeenError {
 
     /// Of clusters against pixels, or of the blend that they were realised from; and of the angles that were left out and
     /// the clusters that were merged since.
-    pub(super) fn of_clusters(clustering: Option<&Clustering>) -> Option<Self> {
-        let clustering = clustering?;
+    ///
+    /// # Errors
+    ///
+    /// Why it is not known, where a step was not measured.
+    pub(super) fn of_clusters(clustering: Option<&Clustering>) -> Result<Self, &'static str> {
+        let clustering = clustering.ok_or(NOT_MEASURED)?;
         let mut seen = match (&clustering.error, clustering.realised_seen) {
             (Some(error), _) => Self {
                 delta_e_2000: error.instrument,
-                lit: error.lit?,
+                lit: error.lit.ok_or(NOT_MEASURED)?,
                 sparkle: error.sparkle.p90,
                 how: SEEN,
                 ..Self::none()
@@ -61,15 +66,16 @@ impl SeenError {
                 ..Self::none()
             }
             .and_step(&of_blend),
-            (None, None) => return None,
+            (None, None) if clustering.realised_lab.is_some() => return Err(REALISED_UNSEEN),
+            (None, None) => return Err(NOT_MEASURED),
         };
         if clustering.left_out_w1.is_some() {
-            seen = seen.and_step(&clustering.left_out_seen?);
+            seen = seen.and_step(&clustering.left_out_seen.ok_or(NOT_MEASURED)?);
         }
         if clustering.reduced_w1.is_some() {
-            seen = seen.and_step(&clustering.reduced_seen?);
+            seen = seen.and_step(&clustering.reduced_seen.ok_or(NOT_MEASURED)?);
         }
-        Some(seen)
+        Ok(seen)
     }
 
     fn and_step(self, step: &SeenDifference) -> Self {
@@ -123,4 +129,4 @@ fn each(mut all: [f64; 6], others: &[f64], of: impl Fn(f64, f64) -> f64) -> [f64
 const NOTHING: &str = "exact: there are no flakes to misplace";
 
 const SEEN: &str = "measured step by step and added up: clusters against pixels, or the blend that a paint was realised from, fewer \
-                    angles or clusters against all, of several paints the worst; a blend against exact transport in the same order, at equal weights; a file against the paint";
+                    angles or clusters against all, of several paints the worst, each over its own base; a blend against exact transport in the same order, at equal weights; a file against the paint";

@@ -33,7 +33,7 @@ fn clustering(color: f64, lit: Option<f64>, sparkle: f64) -> Clustering {
 }
 
 fn seen(clustering: &Clustering) -> Option<SeenError> {
-    SeenError::of_clusters(Some(clustering))
+    SeenError::of_clusters(Some(clustering)).ok()
 }
 
 fn deviations(lit: Option<f64>) -> Vec<BlendDeviation> {
@@ -52,7 +52,7 @@ fn deviations(lit: Option<f64>) -> Vec<BlendDeviation> {
 
 #[test]
 fn what_was_not_measured_is_not_told() {
-    assert!(SeenError::of_clusters(None).is_none());
+    assert!(SeenError::of_clusters(None).is_err());
     assert!(seen(&clustering(0.1, None, 0.0)).is_none());
     let thinned = Clustering {
         left_out_w1: Some(Percentiles::default()),
@@ -105,7 +105,13 @@ fn the_worst_paint_counts_and_steps_add_up_geometry_by_geometry() {
     let seen = file.seen.expect("measured");
     assert_eq!((seen.delta_e_2000, file.lab), ([1.2; 6], Some(0.05)));
     assert!((seen.lit[3] - 0.4).abs() < 1e-12 && (seen.sparkle - 0.09).abs() < 1e-12);
-    assert!(of.stretched(1.0).seen.is_some() && of.stretched(1.6).seen.is_none());
+    let of = ResultError {
+        terms: file.terms,
+        ..of
+    };
+    let is_seen = |sizes| of.stretched(sizes).seen.is_some();
+    assert!(is_seen([1.0, 1.0]) && !is_seen([1.6, 1.0]) && !is_seen([1.0, 1.6]));
+    assert_eq!(of.stretched([1.0, 1.6]).lab, Some(0.05));
     let other = of.of_other_material();
     assert!(other.seen.is_none() && other.unseen.is_some());
 }
@@ -120,6 +126,11 @@ fn a_realised_paint_is_seen_as_its_blend_was_and_what_was_merged_since_adds_up()
         ..clustering(0.0, None, 0.0)
     };
     assert_eq!(seen(&realised), Some(of_blend));
+    let unseen = Clustering {
+        realised_seen: None,
+        ..realised.clone()
+    };
+    assert_eq!(SeenError::of_clusters(Some(&unseen)), Err(REALISED_UNSEEN));
     let reduced = Clustering {
         reduced_w1: Some(Percentiles::default()),
         ..realised
@@ -141,19 +152,25 @@ fn a_realised_paint_is_seen_as_its_blend_was_and_what_was_merged_since_adds_up()
 #[test]
 fn a_picture_is_off_by_chance_and_by_its_paint_or_nobody_knows_how_far() {
     let seen = seen(&clustering(0.25, Some(0.0), 0.0)).expect("measured");
-    let of = ResultError::of(Vec::new(), Ok(seen));
+    let term = Term {
+        what: "clusters",
+        lab: Some(0.5),
+        how: CLUSTERS,
+    };
+    let of = ResultError::of(vec![term], Ok(seen));
     let picture = PictureError::of(0.5, &of);
     assert_eq!(
         (picture.samples, picture.paint, picture.delta_e_2000),
         (0.5, Some(0.25), Some(0.75))
     );
     assert_eq!(picture.with_samples(0.125).delta_e_2000, Some(0.375));
-    let beyond = PictureError::of(0.5, &of.stretched(1.6));
+    let stretched = of.stretched([1.6, 1.6]);
+    let beyond = PictureError::of(0.5, &stretched);
     assert_eq!(
         (beyond.samples, beyond.paint, beyond.delta_e_2000),
         (0.5, None, None)
     );
-    assert_eq!(Some(beyond.how), of.stretched(1.6).unseen);
-    let solid = PictureError::of(0.5, &ResultError::none());
+    assert_eq!(Some(beyond.how), stretched.unseen);
+    let solid = PictureError::of(0.5, &ResultError::none().stretched([3.0, 3.0]));
     assert_eq!(solid.delta_e_2000, Some(0.5));
 }

@@ -81,36 +81,43 @@ struct Fitting<'a> {
     films: RefCell<Films>,
 }
 
-/// What films reflect at the targets: most of a film's residuals. Half of a derivative's columns leave the film
-/// and what is under it as they are, so that the last two are kept.
+/// What films reflect at the targets: most of a film's residuals. Half of a derivative's columns leave the film and what
+/// is under it as they are, so that the one that was asked for again is kept beside the newest.
 #[derive(Default)]
 struct Films {
     kept: [Option<(FilmKey, Vec<Option<LinearRgb>>)>; 2],
-    last: usize,
+    /// Which of them the next unknown one replaces.
+    newest: usize,
 }
 
-/// Index and thickness of a film, and F0 under it.
-type FilmKey = (f64, f64, LinearRgb);
+/// What a film's reflection depends on beside the angle: whether there is one, the factor on F0, the film's index and
+/// thickness, and the F0 under it.
+type FilmKey = (bool, f64, f64, f64, LinearRgb);
 
 impl Films {
-    fn of(&mut self, material: &GltfMaterial, targets: &[Target]) -> &[Option<LinearRgb>] {
-        let f0 = dielectric_f0(material.ior, material.specular_color);
+    fn of(
+        &mut self,
+        material: &GltfMaterial,
+        f0: LinearRgb,
+        targets: &[Target],
+    ) -> &[Option<LinearRgb>] {
         let key = (
+            material.iridescence > 0.0,
+            material.specular,
             material.iridescence_ior,
             material.iridescence_thickness_nm,
             f0,
         );
         let known = |kept: &Option<(FilmKey, _)>| kept.as_ref().is_some_and(|(own, _)| *own == key);
-        if let Some(place) = self.kept.iter().position(known) {
-            self.last = place;
+        let place = self.kept.iter().position(known);
+        if let Some(place) = place {
+            self.newest = 1 - place;
         } else {
-            self.last = 1 - self.last;
             let films = targets.iter().map(|t| material.film(&t.cosines, f0));
-            self.kept[self.last] = Some((key, films.collect()));
+            self.kept[self.newest] = Some((key, films.collect()));
         }
-        self.kept[self.last]
-            .as_ref()
-            .map_or(&[], |(_, films)| films)
+        let place = place.unwrap_or(self.newest);
+        self.kept[place].as_ref().map_or(&[], |(_, films)| films)
     }
 }
 
@@ -139,7 +146,11 @@ impl Problem for Fitting<'_> {
         let f0 = dielectric_f0(material.ior, material.specular_color);
         let mut films = self.films.borrow_mut();
         out.clear();
-        for (t, film) in self.targets.iter().zip(films.of(&material, self.targets)) {
+        for (t, film) in self
+            .targets
+            .iter()
+            .zip(films.of(&material, f0, self.targets))
+        {
             let shown = reflected(material.under_film(&t.cosines, f0, *film));
             let difference = t.metric.difference(t.lab, shown);
             out.extend(difference.map(|d| d * t.weight.sqrt()));

@@ -35,7 +35,7 @@ pub struct ViewQuery {
     /// Width and height in pixels, `512x512` unless given.
     #[param(value_type = Option<String>, pattern = "^[0-9]{1,4}x[0-9]{1,4}$", example = "512x512")]
     size: Option<Size>,
-    /// Samples per pixel, in place of the profile's.
+    /// Samples per pixel, in place of the preset's; refused beside another number in the profile.
     #[param(minimum = 1, maximum = 4096)]
     spp: Option<u32>,
     /// Panorama that lights it and stands behind it, the id of an answer to `POST /v1/environments`; `studio`, the built-in
@@ -49,7 +49,8 @@ pub struct ViewQuery {
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `draft,samples_per_pixel=100`.
     #[param(value_type = Option<String>, example = "standard")]
     profile: Option<ProfileText>,
-    /// In place of a profile: the cheapest whose mean error by sampling is at most this, CIEDE2000.
+    /// In place of a profile: the cheapest whose picture is at most so far off, CIEDE2000 in the mean: what samples leave to
+    /// chance, and the paint's own error.
     #[param(exclusive_minimum = 0.0)]
     max_error: Option<f64>,
     /// In place of a profile: the most accurate that is done in so many seconds here.

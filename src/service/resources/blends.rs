@@ -32,7 +32,7 @@ pub struct BlendOrder {
     /// Accuracy: the name of a preset, or an object of knobs.
     #[schema(value_type = Option<ProfileDocument>)]
     profile: Option<ProfileText>,
-    /// Clusters per slice, in place of the profile's.
+    /// Clusters per slice, in place of the preset's; refused beside another number in the profile.
     #[schema(minimum = 1, maximum = 4096)]
     clusters: Option<u32>,
     /// In place of a profile: the cheapest whose error is at most this, Lab.

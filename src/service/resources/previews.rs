@@ -135,7 +135,7 @@ pub struct PreviewOrder {
     /// Width and height in pixels, 512 and 512 unless given.
     #[schema(value_type = Option<Vec<Side>>, min_items = 2, max_items = 2)]
     size: Option<[u32; 2]>,
-    /// Samples per pixel, in place of the profile's.
+    /// Samples per pixel, in place of the preset's; refused beside another number in the profile.
     #[schema(minimum = 1, maximum = 4096)]
     samples_per_pixel: Option<u32>,
     /// Panorama that lights it and stands behind it, the id of an answer to `POST /v1/environments`; `studio`, the built-in
@@ -148,7 +148,8 @@ pub struct PreviewOrder {
     /// Accuracy: the name of a preset, or an object of knobs.
     #[schema(value_type = Option<ProfileDocument>)]
     profile: Option<ProfileText>,
-    /// In place of a profile: the cheapest whose mean error by sampling is at most this, CIEDE2000.
+    /// In place of a profile: the cheapest whose picture is at most so far off, CIEDE2000 in the mean: what samples leave to
+    /// chance, and the paint's own error.
     #[schema(exclusive_minimum = 0.0)]
     max_error: Option<f64>,
     /// In place of a profile: the most accurate that is done in so many seconds here.

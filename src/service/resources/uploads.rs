@@ -49,7 +49,7 @@ pub struct IngestQuery {
     /// Accuracy: `draft`, `standard`, `reference`, and knobs such as `standard,clusters=100`.
     #[param(value_type = Option<String>, example = "standard")]
     profile: Option<ProfileText>,
-    /// Clusters per slice, in place of the profile's.
+    /// Clusters per slice, in place of the preset's; refused beside another number in the profile.
     #[param(minimum = 1, maximum = 4096)]
     clusters: Option<u32>,
     /// In place of a profile: the cheapest whose error is at most this, Lab.

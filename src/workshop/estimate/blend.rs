@@ -134,11 +134,15 @@ fn of_samples(
     // Clusters were compared on the very slices that they will be compared on; the other terms are of a sample.
     let clusters = error.terms.iter().find(|term| term.what == "clusters");
     // The canonical order is that of the whole paints' hashes, which samples of them do not have.
-    let joined_alike = sampled.len() < 3 || profile.blend.order != Order::Canonical;
-    let known = if joined_alike {
-        EstimatedError::lab(&error)
-    } else {
+    let with_flakes = sampled.iter().filter(|own| own.angles.is_some()).count();
+    let joined_otherwise = sampled.len() > 2
+        && with_flakes > 1
+        && error.lab.is_some()
+        && profile.blend.order == Order::Canonical;
+    let known = if joined_otherwise {
         EstimatedError::not_known("Lab", CANONICAL)
+    } else {
+        EstimatedError::lab(&error)
     };
     let error = EstimatedError {
         at_least: clusters.and_then(|term| term.lab),

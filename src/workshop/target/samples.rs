@@ -84,13 +84,7 @@ pub(super) fn pick_samples(
                 samples: few,
                 error: of_few.samples,
             };
-            // What the paint itself leaves of it; where that is nothing, samples are to do their part all the same.
-            let for_chance = allowed - of_few.paint.unwrap_or(0.0);
-            let for_chance = if for_chance > 0.0 {
-                for_chance
-            } else {
-                allowed
-            };
+            let for_chance = for_chance(allowed, of_few.paint, first, most);
             let seconds_a_sample = (search.seconds() - begun) / f64::from(few);
             // What leaves no time for a picture of as many samples is not measured.
             let wanted = samples_for(for_chance, first, most, &mut |samples| {
@@ -117,6 +111,17 @@ pub(super) fn pick_samples(
     };
     let estimate = small.estimate(picture, &profile, &error);
     Ok(target.picked(estimate, tried, search.seconds()))
+}
+
+/// What chance may take of the error allowed: what the paint leaves of it. Where that is nothing, or less than the most
+/// samples reach, the target is missed whatever is drawn: samples then do their part as if the paint were right.
+fn for_chance(allowed: f64, paint: Option<f64>, first: Measured, most: u32) -> f64 {
+    let left = allowed - paint.unwrap_or(0.0);
+    if left > scaled(first, most).error {
+        left
+    } else {
+        allowed
+    }
 }
 
 /// What another number of samples leaves to chance, by the law of large numbers.
@@ -227,6 +232,25 @@ mod tests {
             assert!(found.error <= allowed, "{allowed} {found:?}");
             assert!(found.samples <= needed * 8 / 5, "{allowed} {found:?}");
             assert!(asked < 8 * needed + 64, "{allowed} {asked}");
+        }
+    }
+
+    #[test]
+    fn chance_may_take_what_the_paint_leaves_where_samples_reach_it() {
+        let first = Measured {
+            samples: 16,
+            error: 1.0,
+        };
+        // 4096 samples leave a sixteenth.
+        for (paint, left) in [
+            (Some(0.0), 1.0),
+            (Some(0.75), 0.25),
+            (Some(0.9375), 1.0),
+            (Some(0.999), 1.0),
+            (Some(2.0), 1.0),
+            (None, 1.0),
+        ] {
+            assert_eq!(for_chance(1.0, paint, first, 4096), left, "{paint:?}");
         }
     }
 

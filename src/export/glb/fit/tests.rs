@@ -170,3 +170,27 @@ fn a_film_that_hardly_helps_is_left_out_though_the_hue_travels() {
     );
     assert_eq!(fit(&reflectance).0, plain.material);
 }
+
+/// Along a walk as a derivative takes it, and from film to film.
+#[test]
+fn what_is_kept_of_films_is_what_they_reflect() {
+    let paint = interference(1.8, 400.0, Some(Coat::smooth(1.5)));
+    let targets = targets(&Reflectance::new(&paint));
+    let fixed = GltfMaterial::default();
+    let problem = Fitting::new(&targets, Layout::Film, fixed, 1.0);
+    let base = vec![0.2, 0.3, 0.4, 0.1, 0.2, 0.3, 0.25, 0.4, 1.8, 400.0];
+    let mut out = Vec::new();
+    for by in [1.0, 1.01, 0.9] {
+        for k in 0..=base.len() {
+            let mut x = base.clone();
+            x.iter_mut().skip(k).take(1).for_each(|v| *v *= by);
+            problem.residuals(&x, &mut out);
+            let material = problem.material(&x);
+            for (t, own) in targets.iter().zip(out.chunks(3)) {
+                let shown = reflected(material.at(&t.cosines));
+                let wanted = t.metric.difference(t.lab, shown);
+                assert_eq!(own, wanted.map(|d| d * t.weight.sqrt()), "{k} by {by}");
+            }
+        }
+    }
+}
