@@ -270,7 +270,7 @@ fn error_told(report: &serde_json::Value) -> String {
     let number = |name: &str| error[name].as_f64();
     match (number("delta_e_2000"), number("samples"), number("paint")) {
         (Some(all), Some(samples), Some(paint)) => format!(
-            ", off by CIEDE2000 {all:.2} in the mean: samples leave {samples:.2} to chance, {paint:.2} is the paint's"
+            ", off by CIEDE2000 {all:.2} in the mean: samples leave {samples:.2} to chance, {paint:.2} is the paint's mean color"
         ),
         (_, Some(samples), _) => format!(
             ", samples leave CIEDE2000 {samples:.2} to chance in the mean; how far off the paint is, is not known: {}",

@@ -163,7 +163,7 @@ pub fn preview(
     let mut notes = chosen.notes;
     if let Some(lab) = error.lab.filter(|lab| *lab > TELLING) {
         notes.push(format!(
-            "the flakes themselves are {lab:.2} Lab off, which no number of samples mends: cluster them more finely"
+            "the flakes themselves are {lab:.2} Lab off, which no number of samples mends: cluster them more finely, or take more angles"
         ));
     }
     let made = Made {

@@ -47,11 +47,8 @@ pub struct Picked {
     pub searched: f64,
 }
 
-/// Part of a time limit after which no more accurate profile is looked for.
-const SEARCH_SHARE: f64 = 0.4;
-
-/// How many times longer than the last the next profile is taken to be looked at for.
-const DEARER: f64 = 1.5;
+/// How many times longer than the last a profile half of the ladder further on is taken to be looked at for.
+const DEARER: f64 = 3.0;
 
 /// A search for a profile, and when it began.
 struct Search(Instant);
@@ -80,11 +77,17 @@ impl Picked {
     /// The same for people, with the reason where the error is not known.
     #[must_use]
     pub fn told(&self) -> String {
-        let why = self.estimate.error.unknown;
-        let why = why.map_or(String::new(), |why| {
+        let Estimate { seconds, error, .. } = &self.estimate;
+        let why = error.unknown.map_or(String::new(), |why| {
             format!(" (its error is not known: {why})")
         });
-        format!("{}{why}", self.line())
+        let late = if self.target.is_in_time(&self.estimate, self.searched) {
+            String::new()
+        } else {
+            let all = seconds + self.searched;
+            format!(" (the search counts too: {all:.3} s)")
+        };
+        format!("{}{why}{late}", self.line())
     }
 
     /// In one line.
@@ -210,8 +213,8 @@ impl Target {
     }
 
     /// Estimates of the fastest and of ever finer ones: half of the finer ones is leapt over as long as the work is done in
-    /// time, half of what was leapt over is gone back otherwise, and no more is looked at than leaves most of the time to the
-    /// work. Of files the finest is the fastest, so that it is the one to look at.
+    /// time, half of what was leapt over is gone back otherwise, and no more is looked at than leaves time for the best that
+    /// is known. Of files the finest is the fastest, so that it is the one to look at.
     fn fast_enough(
         &self,
         work: &Work<'_>,
@@ -223,10 +226,12 @@ impl Target {
             ladder.drain(..ladder.len() - 1);
         }
         let mut estimates: Vec<(usize, Estimate)> = Vec::new();
-        let (mut finer, mut too_slow, mut last) = (0, ladder.len(), 0.0_f64);
+        let (mut finer, mut too_slow) = (0, ladder.len());
+        // Seconds of the last look, and of the best work that is known to be done in time.
+        let (mut last, mut at_hand) = (0.0_f64, 0.0_f64);
         while finer < too_slow {
             let begun = search.seconds();
-            if begun + DEARER * last > SEARCH_SHARE * most && !estimates.is_empty() {
+            if !estimates.is_empty() && begun + DEARER * last + at_hand > most {
                 break;
             }
             let place = if estimates.is_empty() {
@@ -238,6 +243,7 @@ impl Target {
             last = search.seconds() - begun;
             if self.is_in_time(&estimate, search.seconds()) {
                 finer = place + 1;
+                at_hand = estimate.seconds;
             } else {
                 too_slow = place;
             }

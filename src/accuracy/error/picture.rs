@@ -44,6 +44,16 @@ impl PictureError {
         }
     }
 
+    /// The same of a picture whose chance nobody had time to measure.
+    #[must_use]
+    pub const fn unmeasured(&self) -> Self {
+        Self {
+            delta_e_2000: None,
+            how: NO_TIME,
+            ..*self
+        }
+    }
+
     /// Of what a picture's samples leave to chance, and the error of the paint that it shows.
     #[must_use]
     pub fn of(samples: f64, of: &ResultError) -> Self {
@@ -61,5 +71,7 @@ impl PictureError {
 }
 
 const EXACT: &str = "exact: no paint is in it";
+const NO_TIME: &str =
+    "no time was left to measure what so many samples leave to chance; the picture tells it";
 const HOW: &str = "measured and added up: pixels drawn twice, and the paint's mean color at the six instrument geometries, of several \
-                   paints the worst";
+                   paints the worst; flakes that sparkle too little, which `seen` tells, change single pixels more";

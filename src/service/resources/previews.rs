@@ -44,7 +44,9 @@ impl PreviewFormat {
 
 /// A picture of a blend at some weights.
 ///
-/// `json` is the report on the picture: effects that were planned or left out, what was clamped, how accurate it is.
+/// `json` is the report on the picture: effects that were planned or left out, what was clamped, how accurate it is:
+/// `picture_error` is how far off it is, CIEDE2000 in the mean, by its samples' chance and by its paint; `error` that of
+/// the flakes; `rendering.sampling` the chance by percentiles and in FLIP.
 #[utoipa::path(
     get, operation_id = "preview_blend", path = "/v1/blends/{id}/preview.{format}", tag = "previews",
     params(("id" = String, Path, description = "Blend"), ("format" = PreviewFormat, Path, description = "Picture, or its report"), WeightQuery, ViewQuery),
@@ -72,7 +74,9 @@ pub async fn of_blend(
 
 /// A picture of a paint.
 ///
-/// `json` is the report on the picture: effects that were planned or left out, how accurate it is.
+/// `json` is the report on the picture: effects that were planned or left out, how accurate it is:
+/// `picture_error` is how far off it is, CIEDE2000 in the mean, by its samples' chance and by its paint; `error` that of
+/// the flakes; `rendering.sampling` the chance by percentiles and in FLIP.
 #[utoipa::path(
     get, operation_id = "preview_paint", path = "/v1/paints/{id}/preview.{format}", tag = "previews",
     params(("id" = String, Path, description = "Paint"), ("format" = PreviewFormat, Path, description = "Picture, or its report"), ViewQuery),

@@ -290,7 +290,7 @@ fn fitted(
     // The very slices that the ingest will be compared on.
     let (seconds, _) = timed(|| clustering_error(pictures, &paints[1].paint));
     stages.push(Stage {
-        stage: "compare",
+        stage: "error",
         seconds,
     });
     // It hardly depends on the number of slices.

@@ -44,9 +44,9 @@ struct SmallPicture {
     stages: Vec<Lap>,
 }
 
-/// Work, pixels times batches of samples, up to which a picture is drawn itself to tell what it takes: no more than its
-/// samples may come to.
-const LITTLE: f64 = 160.0 * 160.0 * 2.0;
+/// Work, pixels times batches of samples, up to which a picture is drawn itself to tell what it takes: that is about what
+/// its samples come to, each drawn three times.
+const LITTLE: f64 = 4.0 * 160.0 * 160.0 * 2.0;
 
 /// Samples come in batches: up to one a pixel takes about the same.
 fn batches(samples_per_pixel: u32) -> f64 {

@@ -4,6 +4,8 @@
 //! from a few small pictures. The error of chance falls about as one over the root of the samples: it is
 //! measured on a lattice of pixels, the number that should do follows, and is measured in turn.
 
+use std::cell::RefCell;
+
 use super::{Picked, Search, Target};
 use crate::accuracy::Profile;
 use crate::workshop::estimate::{PictureWork, SmallPictures};
@@ -42,11 +44,16 @@ pub(super) fn pick_samples(
     let most = most as u32;
     let few = FIRST.min(most);
     let small = SmallPictures::to_search(picture, few)?;
-    let mut tried = 1;
-    let mut measure = |samples: u32| {
-        tried += 1;
-        picture.error_of(samples)
+    let measured = RefCell::new(Vec::new());
+    let measure = |samples: u32| {
+        let of = picture.error_of(samples)?;
+        measured.borrow_mut().push(samples);
+        Ok::<_, WorkshopError>(of)
     };
+    // Telling the error takes its time too: about as long as a small picture, and its share of the pixels.
+    let told = (TOLD_PIXELS / (width * height).max(1) as f64).min(1.0);
+    let telling =
+        |samples: u32| small.least_seconds() + told * small.seconds(picture, samples.max(1));
     // Most that are drawn in what is left of the time, if something else takes so many seconds before.
     let in_time = |before: f64| {
         let fits = |samples: u32| {
@@ -71,38 +78,38 @@ pub(super) fn pick_samples(
     };
     let (samples, error) = match target.max_error {
         None => {
-            // Telling the error takes its time too: about as long as a small picture, and its share of the pixels.
-            let told = TOLD_PIXELS / (width * height).max(1) as f64;
-            let telling = small.seconds(picture, in_time(0.0).max(1)) * told.min(1.0);
-            let samples = in_time(small.least_seconds() + telling).max(1);
-            (samples, picture.error_of(samples)?)
+            let samples = in_time(telling(in_time(0.0))).max(1);
+            (samples, measure(samples)?)
         }
         Some(allowed) => {
-            let begun = search.seconds();
             let of_few = measure(few)?;
             let first = Measured {
                 samples: few,
                 error: of_few.samples,
             };
             let for_chance = for_chance(allowed, of_few.paint, first, most);
-            let seconds_a_sample = (search.seconds() - begun) / f64::from(few);
             // What leaves no time for a picture of as many samples is not measured.
+            let worth_it = |samples: u32| samples <= in_time(telling(samples));
             let wanted = samples_for(for_chance, first, most, &mut |samples| {
-                let takes = seconds_a_sample * f64::from(samples);
-                let worth_it = samples <= in_time(takes);
-                let of = worth_it.then(|| measure(samples)).transpose()?;
+                let of = worth_it(samples).then(|| measure(samples)).transpose()?;
                 Ok(of.map(|of| Measured {
                     samples,
                     error: of.samples,
                 }))
             })?;
-            let left = in_time(0.0).max(1);
-            let chosen = if wanted.samples <= left {
-                wanted
+            let samples = wanted.samples.min(in_time(0.0).max(1));
+            // Chance that was reckoned is no promise.
+            let is_known = measured.borrow().contains(&samples);
+            let error = if is_known && samples == wanted.samples {
+                of_few.with_samples(wanted.error)
+            } else if samples == few {
+                of_few
+            } else if worth_it(samples) {
+                measure(samples)?
             } else {
-                scaled(first, left)
+                of_few.unmeasured()
             };
-            (chosen.samples, of_few.with_samples(chosen.error))
+            (samples, error)
         }
     };
     let profile = Profile {
@@ -110,6 +117,7 @@ pub(super) fn pick_samples(
         ..Profile::standard()
     };
     let estimate = small.estimate(picture, &profile, &error);
+    let tried = 1 + measured.borrow().len();
     Ok(target.picked(estimate, tried, search.seconds()))
 }
 
