@@ -47,7 +47,8 @@ pub struct Picked {
     pub searched: f64,
 }
 
-/// How many times longer than the last a profile half of the ladder further on is taken to be looked at for.
+/// How many times longer than the last a profile half of the ladder further on is taken to be looked at for; one half of the
+/// way back takes no longer.
 const DEARER: f64 = 3.0;
 
 /// A search for a profile, and when it began.
@@ -229,9 +230,11 @@ impl Target {
         let (mut finer, mut too_slow) = (0, ladder.len());
         // Seconds of the last look, and of the best work that is known to be done in time.
         let (mut last, mut at_hand) = (0.0_f64, 0.0_f64);
+        let mut went_back = false;
         while finer < too_slow {
             let begun = search.seconds();
-            if !estimates.is_empty() && begun + DEARER * last + at_hand > most {
+            let dearer = if went_back { 1.0 } else { DEARER };
+            if !estimates.is_empty() && begun + dearer * last + at_hand > most {
                 break;
             }
             let place = if estimates.is_empty() {
@@ -243,9 +246,11 @@ impl Target {
             last = search.seconds() - begun;
             if self.is_in_time(&estimate, search.seconds()) {
                 finer = place + 1;
+                went_back = false;
                 at_hand = estimate.seconds;
             } else {
                 too_slow = place;
+                went_back = true;
             }
             estimates.push((place, estimate));
         }
