@@ -7,9 +7,10 @@ use super::ResultError;
 /// Error of a picture: what its samples leave to chance, and how far off the paint in it is.
 ///
 /// Either is a mean of CIEDE2000, over pixels and over the instrument geometries. Their sum is no bound: light from all
-/// sides meets other angles than an instrument does. Of thinned and coarsely clustered paints in the studio, a picture's
-/// difference to the reference's, chance of that one included, was 0.2 to 1.8 times the sum: least where of several
-/// paints another than the worst was drawn.
+/// sides meets other angles than an instrument does, and flakes of the right mean that sparkle too little are in neither
+/// part. Of paints of 4 to 50 clusters in the studio, thinned or not, a picture's difference to the reference's, chance of
+/// that one included, was 0.2 to 1.8 times the sum: least where of several paints another than the worst was drawn. Of one
+/// cluster a slice it was seven times.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PictureError {
     /// Sum of both parts, CIEDE2000; null where the paint's is not known.
