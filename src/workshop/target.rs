@@ -1,11 +1,12 @@
 //! A target in place of knobs: the cheapest profile that is accurate enough, or the most accurate that is fast enough.
 //!
 //! The profiles of a short ladder are estimated on the work itself, from cheap to dear: for an error until one will do, for
-//! a time as long as looking further takes little of it. Where an estimate's error is of a sample of the slices, the
-//! error is measured in full before a profile is picked for it, unless the part of it that is known is too much already.
+//! a time as long as another look leaves time for the best that is known. Where an estimate's error is of a sample of the
+//! slices, it is measured in full before a profile is picked for it, unless the part that is known is too much already.
 //! What is picked for a time limit depends on the machine; the result depends on the profile picked and on nothing else.
 
 mod ladder;
+mod picked;
 mod samples;
 
 use std::time::Instant;
@@ -15,9 +16,10 @@ use utoipa::ToSchema;
 
 use super::estimate::{Estimate, EstimatedError, Work};
 use super::{Format, IngestOptions, WorkshopError, blend_paints, open_paints};
-use crate::accuracy::{Knobs, Profile, blend_error};
+use crate::accuracy::blend_error;
 use crate::paint::PaintFile;
 use ladder::ladder;
+pub use picked::Picked;
 
 /// What a result should keep to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, ToSchema)]
@@ -31,22 +33,6 @@ pub struct Target {
     pub max_seconds: Option<f64>,
 }
 
-/// A profile picked for a target.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Picked {
-    /// What was asked for.
-    pub target: Target,
-    /// Whether it is met; if not, this is the best that could be done: of a picture whose paint alone is too far off, samples
-    /// as if it were not.
-    pub met: bool,
-    /// The profile, and what the work will take with it.
-    pub estimate: Estimate,
-    /// How many profiles were looked at, from cheap to dear.
-    pub tried: usize,
-    /// Seconds that took.
-    pub searched: f64,
-}
-
 /// How many times longer than the last a profile half of the ladder further on is taken to be looked at for; one half of the
 /// way back takes no longer.
 const DEARER: f64 = 3.0;
@@ -57,50 +43,6 @@ struct Search(Instant);
 impl Search {
     fn seconds(&self) -> f64 {
         self.0.elapsed().as_secs_f64()
-    }
-}
-
-impl Picked {
-    /// The same as it is for who finds it at hand, without a search of his own.
-    #[must_use]
-    pub fn at_hand(mut self) -> Self {
-        self.searched = 0.0;
-        self.met = self.target.is_met(&self.estimate, 0.0);
-        self
-    }
-
-    /// The profile.
-    #[must_use]
-    pub const fn profile(&self) -> &Profile {
-        &self.estimate.knobs
-    }
-
-    /// The same for people, with the reason where the error is not known.
-    #[must_use]
-    pub fn told(&self) -> String {
-        let Estimate { seconds, error, .. } = &self.estimate;
-        let why = error.unknown.map_or(String::new(), |why| {
-            format!(" (its error is not known: {why})")
-        });
-        let late = if self.target.is_in_time(&self.estimate, self.searched) {
-            String::new()
-        } else {
-            let all = seconds + self.searched;
-            format!(" (the search counts too: {all:.3} s)")
-        };
-        format!("{}{why}{late}", self.line())
-    }
-
-    /// In one line.
-    #[must_use]
-    pub fn line(&self) -> String {
-        let Estimate { seconds, error, .. } = &self.estimate;
-        format!(
-            "{}; profile={}, error={error}, seconds={seconds:.3}, searched={:.3}",
-            if self.met { "met" } else { "not met" },
-            Knobs::told(self.profile()),
-            self.searched,
-        )
     }
 }
 
@@ -320,6 +262,7 @@ fn measure_error(work: &Work<'_>, estimate: &mut Estimate) -> Result<(), Worksho
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accuracy::Profile;
     use crate::workshop::Stage;
 
     fn estimate(seconds: f64, error: f64) -> Estimate {
