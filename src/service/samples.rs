@@ -152,7 +152,7 @@ mod tests {
     }
 
     const GOLDEN: [&str; 9] = [
-        "model 12",
+        "model 13",
         "169 slices",
         "2002 clusters, 91.7 Lab",
         "grain 15.9",

@@ -16,6 +16,8 @@
 //! found costs at most `(1 + TIE_BREAK)` times the optimum of `d`, and duals of the tilted cost divided by that factor
 //! are duals of `d`. Plans report the true cost, never the tilted one.
 
+use super::problem::{Cloud, Problem};
+
 /// Relative tilt of the distance that breaks ties. Half of the 1e-9 by which costs may differ between exact solvers.
 pub(super) const TIE_BREAK: f64 = 5e-10;
 
@@ -63,62 +65,62 @@ pub(super) struct CostMatrix {
     lanes: Vec<[f64; LANES]>,
     /// Blocks of [`LANES`] columns in a row.
     stride: usize,
-    /// Target coordinates by axis, padded.
+    /// Columns that are targets.
+    targets: usize,
+    /// Targets, padded with the last one without mass: coordinates by axis, and masses.
     axes: [Vec<[f64; LANES]>; 3],
+    masses: Vec<[f64; LANES]>,
+    source_means: Vec<f64>,
+    target_means: Vec<[f64; LANES]>,
     /// No cost exceeds this.
     largest: f64,
 }
 
 impl CostMatrix {
-    /// Fills in the tilted costs between two clouds.
-    pub(super) fn fill(&mut self, sources: &[[f64; 3]], targets: &[[f64; 3]], cost: Cost) {
+    /// Fills in the tilted costs between two clouds, and their means.
+    pub(super) fn fill(&mut self, problem: &Problem, cost: Cost) {
+        let (sources, targets) = (problem.source(), problem.target());
         let stride = targets.len().div_ceil(LANES);
         self.stride = stride;
-        let [xs, ys, zs] = &mut self.axes;
-        for (axis, values) in [&mut *xs, &mut *ys, &mut *zs].into_iter().enumerate() {
+        self.targets = targets.len();
+        let last = targets.points()[targets.len() - 1];
+        for (axis, values) in self.axes.iter_mut().enumerate() {
             values.clear();
-            let (blocks, rest) = targets.as_chunks::<LANES>();
-            values.extend(blocks.iter().map(|block| block.map(|point| point[axis])));
-            if !rest.is_empty() {
-                let mut last = [f64::INFINITY; LANES];
-                for (value, point) in last.iter_mut().zip(rest) {
-                    *value = point[axis];
-                }
-                values.push(last);
+            values.resize(stride, [last[axis]; LANES]);
+            for (value, point) in values.as_flattened_mut().iter_mut().zip(targets.points()) {
+                *value = point[axis];
             }
         }
-        let (mut low, mut high) = (sources[0], sources[0]);
-        for point in sources.iter().chain(targets) {
+        for lanes in [&mut self.masses, &mut self.target_means] {
+            lanes.clear();
+            lanes.resize(stride, [0.0; LANES]);
+        }
+        self.masses.as_flattened_mut()[..targets.len()].copy_from_slice(targets.masses());
+        self.source_means.clear();
+        self.source_means.resize(sources.len(), 0.0);
+        // Every row is written whole: what an earlier problem left there need not be cleared.
+        self.lanes.resize(sources.len() * stride, [0.0; LANES]);
+
+        let (mut low, mut high) = (sources.points()[0], sources.points()[0]);
+        for point in sources.points().iter().chain(targets.points()) {
             for ((low, high), &x) in low.iter_mut().zip(&mut high).zip(point) {
                 *low = if x < *low { x } else { *low };
                 *high = if x > *high { x } else { *high };
             }
         }
         let diagonal = Cost::Distance.between(low, high);
-        // All points in one place: every cost is 0 whatever epsilon, as long as it is finite.
-        let epsilon = TIE_BREAK / diagonal.max(1e-200);
         self.largest = match cost {
             Cost::Distance => diagonal,
             Cost::SquaredDistance => diagonal * diagonal,
         } * cost.tilt();
-        self.lanes.clear();
-        for &[x, y, z] in sources {
-            let columns = xs.iter().zip(&*ys).zip(&*zs);
-            self.lanes.extend(columns.map(|((xs, ys), zs)| {
-                let mut costs = [0.0; LANES];
-                for lane in 0..LANES {
-                    let (dx, dy, dz) = (xs[lane] - x, ys[lane] - y, zs[lane] - z);
-                    let squared = dx * dx + dy * dy + dz * dz;
-                    costs[lane] = match cost {
-                        Cost::Distance => {
-                            let distance = squared.sqrt();
-                            distance + epsilon * squared
-                        }
-                        Cost::SquaredDistance => squared,
-                    };
-                }
-                costs
-            }));
+        // All points in one place: every cost is 0 whatever epsilon, as long as it is finite.
+        let epsilon = TIE_BREAK / diagonal.max(1e-200);
+        let tilted = |squared: f64| squared.sqrt() + epsilon * squared;
+        match cost {
+            Cost::Distance => pulp::Arch::new().dispatch(Rows(self, sources, tilted)),
+            Cost::SquaredDistance => {
+                pulp::Arch::new().dispatch(Rows(self, sources, |squared| squared));
+            }
         }
     }
 
@@ -137,6 +139,16 @@ impl CostMatrix {
         self.row(source).as_flattened()[target]
     }
 
+    /// Each source's mean cost over the targets, weighted by their masses.
+    pub(super) fn source_means(&self) -> &[f64] {
+        &self.source_means
+    }
+
+    /// Each target's mean cost over the sources, weighted by their masses, padded with numbers.
+    pub(super) fn target_means(&self) -> &[[f64; LANES]] {
+        &self.target_means
+    }
+
     /// A bound no cost exceeds.
     pub(super) fn largest(&self) -> f64 {
         self.largest
@@ -145,5 +157,55 @@ impl CostMatrix {
     /// Blocks of [`LANES`] columns in a row.
     pub(super) fn stride(&self) -> usize {
         self.stride
+    }
+}
+
+/// The rows of a matrix from its sources and a cost of the squared distance, compiled for wide registers too.
+struct Rows<'a, F>(&'a mut CostMatrix, &'a Cloud, F);
+
+impl<F: Fn(f64) -> f64> pulp::NullaryFnOnce for Rows<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self(matrix, sources, cost) = self;
+        let CostMatrix {
+            lanes,
+            stride,
+            axes: [xs, ys, zs],
+            targets,
+            masses,
+            source_means,
+            target_means,
+            ..
+        } = matrix;
+        for (((row, &[x, y, z]), &supply), mean) in lanes
+            .chunks_exact_mut(*stride)
+            .zip(sources.points())
+            .zip(sources.masses())
+            .zip(source_means)
+        {
+            let mut sums = [0.0; LANES];
+            let places = xs.iter().zip(&*ys).zip(&*zs).zip(&*masses);
+            for ((costs, means), (((xs, ys), zs), masses)) in
+                row.iter_mut().zip(&mut *target_means).zip(places)
+            {
+                // One loop a purpose: of all in one the compiler makes no vectors.
+                let mut block = [0.0; LANES];
+                for lane in 0..LANES {
+                    let (dx, dy, dz) = (xs[lane] - x, ys[lane] - y, zs[lane] - z);
+                    block[lane] = cost(dx * dx + dy * dy + dz * dz);
+                }
+                for lane in 0..LANES {
+                    sums[lane] += masses[lane] * block[lane];
+                }
+                for lane in 0..LANES {
+                    means[lane] += supply * block[lane];
+                }
+                *costs = block;
+            }
+            *mean = sums.iter().sum();
+            row.as_flattened_mut()[*targets..].fill(f64::INFINITY);
+        }
     }
 }

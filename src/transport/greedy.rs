@@ -9,7 +9,7 @@ use super::Solver;
 use super::cost::{Cost, LANES};
 use super::plan::Plan;
 use super::problem::{Problem, TransportError};
-use super::start::{cheaper_start, mean_costs, row_minimum, steps_as_flows};
+use super::start::{cheaper_start, row_minimum, steps_as_flows};
 use super::vertex::Flow;
 use super::workspace::Workspace;
 
@@ -55,7 +55,7 @@ impl Solver for Greedy {
         target_duals.resize(matrix.stride(), [0.0; LANES]);
         for use_means in [false, true] {
             if use_means {
-                mean_costs(matrix, units, target_duals);
+                target_duals.copy_from_slice(matrix.target_means());
             }
             source_duals.clear();
             source_duals.extend(matrix.rows().map(|row| row_minimum(row, target_duals)));

@@ -1,12 +1,20 @@
 //! A feasible basis to begin with, or to make do with: the cheaper of two.
 //!
 //! One is greedy: source by source, cheapest target first. Costs are judged after subtracting each target's mean cost, a
-//! first guess of its dual: a target far from everybody is then not shunned until only bad offers are left. The other is
-//! monotone: both clouds are sorted along the axis on which they spread most, and mass flows in that order. Where clouds
-//! lie near a line, as flakes of one hue do along lightness, it is nearly optimal, and the greedy one far from it.
+//! first guess of its dual: a target far from everybody is then not shunned until only bad offers are left. For the same
+//! reason the sources' turns are in the order of their best offers less their own mean costs: those far from everybody
+//! choose first, and those in the middle, who can go anywhere at a like price, take what is left. (Russell judges pairs
+//! in the same way, by the greatest costs of rows and columns where these are means.) On paint slices that saves a fifth
+//! to a half of the pivots that the order of the list leaves.
+//!
+//! The other is monotone: both clouds are sorted along the axis on which they spread most, and mass flows in that order.
+//! Where clouds lie on a line, as gray flakes do along lightness, it is optimal, and the greedy one far from it.
 //!
 //! Every step empties a source or fills a target, so the steps are the edges of a spanning tree, listed from the leaves
 //! up: each closes a point, whose parent is the other end.
+//!
+//! E. J. Russell, "Extension of Dantzig's algorithm to finding an initial near-optimal basis for the transportation
+//! problem", Operations Research 17, 1969.
 
 use super::cost::{CostMatrix, LANES};
 use super::problem::Problem;
@@ -79,6 +87,8 @@ pub(super) struct StartMemory {
     /// The steps, from the leaves up. The last one closes the last source onto the last open target.
     pub steps: Vec<Closing>,
     values: Vec<[f64; LANES]>,
+    /// Whose turn is when: what is judged by, and the source.
+    order: Vec<(f64, usize)>,
     left: Vec<i64>,
     monotone: Monotone,
 }
@@ -141,33 +151,6 @@ pub(super) fn steps_as_flows(steps: &[Closing]) -> impl Iterator<Item = Flow> + 
     })
 }
 
-/// Each target's mean cost over the sources, weighted by their supplies; 0 in the padding.
-#[inline(always)]
-pub(super) fn mean_costs(matrix: &CostMatrix, units: &Units, means: &mut [[f64; LANES]]) {
-    means.fill([0.0; LANES]);
-    let mut weights = 0.0;
-    for (row, &supply) in matrix.rows().zip(&units.supplies) {
-        #[expect(clippy::cast_precision_loss, reason = "a weight of a guess")]
-        let weight = supply as f64;
-        weights += weight;
-        for (costs, sums) in row.iter().zip(&mut *means) {
-            for (cost, sum) in costs.iter().zip(sums) {
-                *sum += weight * cost;
-            }
-        }
-    }
-    // Leftovers of a finished flow can be nothing at all.
-    let share = 1.0 / f64::max(weights, 1.0);
-    for (target, mean) in means.as_flattened_mut().iter_mut().enumerate() {
-        // The padding costs infinity, and infinity less infinity is no number.
-        *mean = if target < units.demands.len() {
-            *mean * share
-        } else {
-            0.0
-        };
-    }
-}
-
 /// Lists the steps of the cheaper start.
 #[inline(always)]
 pub(super) fn cheaper_start(
@@ -208,7 +191,7 @@ impl Monotone {
         ] {
             places.clear();
             places.extend(cloud.points().iter().enumerate().map(|(k, p)| (p[axis], k)));
-            places.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+            sort(places);
         }
         steps.clear();
         let (mut sources, mut targets) = (sources.iter(), targets.iter());
@@ -250,6 +233,11 @@ impl Monotone {
     }
 }
 
+/// By value, then by number.
+fn sort(numbered: &mut [(f64, usize)]) {
+    numbered.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+}
+
 /// The axis on which both clouds together spread most, the first of equals.
 fn widest_axis(problem: &Problem) -> usize {
     let points = || {
@@ -280,25 +268,31 @@ pub(super) fn greedy_start(matrix: &CostMatrix, units: &Units, memory: &mut Star
     let StartMemory {
         steps,
         values,
+        order,
         left,
         ..
     } = memory;
-    let sources = units.supplies.len();
     values.clear();
-    values.resize(matrix.stride(), [0.0; LANES]);
-    mean_costs(matrix, units, values);
+    values.extend_from_slice(matrix.target_means());
+    order.clear();
+    // A loop, because a closure of an iterator need not be compiled for the wide registers that the caller is.
+    for (source, (row, mean)) in matrix.rows().zip(matrix.source_means()).enumerate() {
+        order.push((row_minimum(row, values) - mean, source));
+    }
+    sort(order);
     left.clear();
     left.extend_from_slice(&units.demands);
     steps.clear();
     let mut open = left.len();
-    for source in 0..sources {
+    for (turn, &(_, source)) in order.iter().enumerate() {
+        let is_last = turn + 1 == order.len();
         let row = matrix.row(source);
         let mut supply = units.supplies[source];
         loop {
             let target = column_of(row, values, row_minimum(row, values));
             let demand = left[target];
             // One target stays open to the end: it is the root, and takes what is left.
-            if open == 1 || supply < demand && source + 1 < sources {
+            if open == 1 || supply < demand && !is_last {
                 left[target] = demand - supply;
                 steps.push(Closing::Source {
                     closed: source,

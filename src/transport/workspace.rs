@@ -24,8 +24,7 @@ pub struct Workspace {
 impl Workspace {
     /// Fills costs and units for a problem.
     pub(super) fn prepare(&mut self, problem: &Problem, cost: Cost) {
-        self.matrix
-            .fill(problem.source().points(), problem.target().points(), cost);
+        self.matrix.fill(problem, cost);
         self.units.fill(problem);
     }
 }

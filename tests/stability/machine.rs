@@ -359,7 +359,7 @@ const DIGEST: [(&str, f64); 14] = [
     ("render.light", 644.088_590_264_320_4),
     ("paint.coat", 1_018.895_553_386_850_5),
     ("fit.clusters", 112.787_367_970_682_68),
-    ("transport.smooth", 24.061_162_723_725_26),
+    ("transport.smooth", 24.062_643_337_004_566),
 ];
 
 #[test]
