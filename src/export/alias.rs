@@ -22,55 +22,66 @@ pub struct AliasEntry {
 /// When there are more than 2^32 clusters.
 #[must_use]
 pub fn alias_table(probability: &[f64]) -> Vec<AliasEntry> {
-    let mut table = Vec::with_capacity(probability.len());
-    Builder::default().build(probability, &mut table);
+    let clusters = u32::try_from(probability.len()).expect("no more than 2^32 clusters");
+    let whole = |alias| AliasEntry {
+        threshold: 1.0,
+        alias,
+    };
+    let mut table: Vec<AliasEntry> = (0..clusters).map(whole).collect();
+    Slots::default().share(probability, |slot, threshold, alias| {
+        table[slot as usize] = AliasEntry { threshold, alias };
+    });
     table
 }
 
-/// Work lists that are kept between slices.
+/// Memory that is kept between slices.
 #[derive(Debug, Default)]
-pub(super) struct Builder {
-    small: Vec<u32>,
-    large: Vec<u32>,
-    scaled: Vec<f64>,
+pub(super) struct Slots {
+    /// How much of a slot each cluster fills: 1 is a whole one.
+    fill: Vec<f64>,
+    /// Clusters that fill less than one, then, from the end backwards, those that fill more.
+    order: Vec<u32>,
 }
 
-impl Builder {
-    /// Appends the table of a slice.
-    pub(super) fn build(&mut self, probability: &[f64], table: &mut Vec<AliasEntry>) {
-        let first = table.len();
+impl Slots {
+    /// Calls `set` with slot, threshold and alias of every slot that two clusters share; the others are whole.
+    pub(super) fn share(&mut self, probability: &[f64], mut set: impl FnMut(u32, f64, u32)) {
+        let Self { fill, order } = self;
         #[allow(clippy::cast_precision_loss)] // a count of clusters
         let n = probability.len() as f64;
-        self.small.clear();
-        self.large.clear();
-        self.scaled.clear();
-        self.scaled.extend(probability.iter().map(|p| p * n));
-        for (k, &share) in (0_u32..).zip(&self.scaled) {
-            table.push(AliasEntry {
-                threshold: 1.0,
-                alias: k,
-            });
-            if share < 1.0 {
-                self.small.push(k);
-            } else {
-                self.large.push(k);
+        fill.clear();
+        fill.extend(probability.iter().map(|p| p * n));
+        order.clear();
+        order.resize(fill.len(), 0);
+        // Written at both ends, and kept at one: whether a cluster is small is a coin that no processor predicts.
+        let (mut smalls, mut larges) = (0, fill.len());
+        for (cluster, &fill) in (0_u32..).zip(&*fill) {
+            let is_small = fill < 1.0;
+            order[smalls] = cluster;
+            order[larges - 1] = cluster;
+            smalls += usize::from(is_small);
+            larges -= usize::from(!is_small);
+        }
+        let (small, large) = order.split_at(smalls);
+        let mut large = large.iter().rev();
+        let Some(&(mut high)) = large.next() else {
+            return;
+        };
+        let mut rest = fill[high as usize];
+        for &low in small {
+            let share = fill[low as usize];
+            set(low, share.max(0.0), high);
+            rest = (rest + share) - 1.0;
+            while rest < 1.0 {
+                let Some(&next) = large.next() else {
+                    // What is left is 1 but for rounding, and keeps its slot whole.
+                    return;
+                };
+                set(high, rest.max(0.0), next);
+                rest = (fill[next as usize] + rest) - 1.0;
+                high = next;
             }
         }
-        while let (Some(&low), Some(&high)) = (self.small.last(), self.large.last()) {
-            self.small.pop();
-            let share = self.scaled[low as usize];
-            table[first + low as usize] = AliasEntry {
-                threshold: share.max(0.0),
-                alias: high,
-            };
-            let left = (self.scaled[high as usize] + share) - 1.0;
-            self.scaled[high as usize] = left;
-            if left < 1.0 {
-                self.large.pop();
-                self.small.push(high);
-            }
-        }
-        // What is left on either list is 1 but for rounding, and keeps its slot whole.
     }
 }
 

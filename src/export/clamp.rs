@@ -29,10 +29,11 @@ pub struct Clamped {
 /// Smallest magnitude, other than 0, that every reader of halves reads alike.
 const HALF_MIN: f32 = 6.103_515_6e-5;
 
-/// Refuses numbers that are not finite.
-pub(super) fn finite(what: &'static str, values: &[f32]) -> Result<(), ExportError> {
-    if largest_magnitude(values).is_finite() {
-        return Ok(());
+/// The largest magnitude of finite numbers; refuses others.
+pub(super) fn finite(what: &'static str, values: &[f32]) -> Result<f32, ExportError> {
+    let largest = largest_magnitude(values);
+    if largest.is_finite() {
+        return Ok(largest);
     }
     let index = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
     Err(ExportError::NotFinite { what, index })
@@ -73,20 +74,19 @@ pub(super) fn halves(
     values: &mut [f32],
     clamped: &mut Vec<Clamped>,
 ) -> Result<Halves, ExportError> {
-    finite(what, values)?;
+    if finite(what, values)? > HALF_MAX {
+        hold(what, values, clamped);
+    }
     let mut list = vec![f16::ZERO; values.len()];
     let (mut rounding, mut back) = (0.0_f32, [0.0; BLOCK]);
-    for (values, list) in values.chunks_mut(BLOCK).zip(list.chunks_mut(BLOCK)) {
-        if largest_magnitude(values) > HALF_MAX {
-            hold(what, values, clamped);
-        }
+    for (values, list) in values.chunks(BLOCK).zip(list.chunks_mut(BLOCK)) {
         list.convert_from_f32_slice(values);
         // Counted, not searched for: a search that may stop would go number by number.
         let small = values
             .iter()
             .filter(|value| value.abs() < HALF_MIN && **value != 0.0);
         if small.count() > 0 {
-            for (half, value) in list.iter_mut().zip(&*values) {
+            for (half, value) in list.iter_mut().zip(values) {
                 if value.abs() < HALF_MIN {
                     *half = f16::from_f32(without_subnormals(*value));
                 }
@@ -94,7 +94,7 @@ pub(super) fn halves(
         }
         let back = &mut back[..values.len()];
         list.convert_to_f32_slice(back);
-        for (back, value) in back.iter_mut().zip(&*values) {
+        for (back, value) in back.iter_mut().zip(values) {
             *back -= value;
         }
         rounding = rounding.max(largest_magnitude(back));

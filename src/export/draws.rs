@@ -27,19 +27,25 @@ impl Textures {
     }
 
     fn alias(&mut self, flakes: &Flakes, width: usize) -> Result<(), ExportError> {
-        let mut builder = alias::Builder::default();
-        let mut table = Vec::with_capacity(flakes.widest_slice());
+        let mut slots = alias::Slots::default();
         let texels = flakes.clusters().next_multiple_of(width);
-        let (mut threshold, mut alias) = (Vec::with_capacity(texels), Vec::with_capacity(texels));
-        for k in 0..flakes.slices() {
-            table.clear();
-            builder.build(flakes.slice_at(k).probability, &mut table);
-            #[allow(clippy::cast_possible_truncation)] // texel precision
-            threshold.extend(table.iter().map(|entry| entry.threshold as f32));
+        let mut threshold = vec![1.0; texels];
+        let mut alias = Vec::with_capacity(texels);
+        for range in flakes.offsets.windows(2) {
+            let first = alias.len();
+            let range = range[0] as usize..range[1] as usize;
             #[allow(clippy::cast_precision_loss)] // below 2^24, exact
-            alias.extend(table.iter().map(|entry| entry.alias as f32));
+            alias.extend((0..range.len()).map(|cluster| cluster as f32));
+            let (threshold, alias) = (&mut threshold[first..], &mut alias[first..]);
+            slots.share(&flakes.probability[range], |slot, share, other| {
+                #[allow(clippy::cast_possible_truncation)] // texel precision
+                let share = share as f32;
+                threshold[slot as usize] = share;
+                #[allow(clippy::cast_precision_loss)] // below 2^24, exact
+                let other = other as f32;
+                alias[slot as usize] = other;
+            });
         }
-        threshold.resize(texels, 1.0);
         alias.resize(texels, 0.0);
         let about = "alias table of every slice: threshold (R, 0 to 1) and alias (G, cluster within the slice)";
         self.floats("alias", width, &[("R", &threshold), ("G", &alias)], about)

@@ -57,8 +57,8 @@ impl Step for u8 {
     }
 }
 
-/// Steps that are written at once: a cluster of fifty has ten, and the next one overwrites what is too much.
-const RUN: usize = 8;
+/// Steps that are written at once, wanted or not: a cluster of fifty has ten, and the next one overwrites what is too much.
+const RUN: usize = 16;
 
 /// Writes the [`STEPS`] steps of a slice and returns its two losses.
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)] // at most 500
@@ -78,9 +78,12 @@ pub(super) fn write<T: Step>(probability: &[f64], luminance: &[f64], steps: &mut
             ((cumulative * count + 0.5) as usize).clamp(next, STEPS)
         };
         let mut at = next;
-        while at < end {
+        loop {
             row[at..at + RUN].copy_from_slice(&[T::of(k); RUN]);
             at += RUN;
+            if at >= end {
+                break;
+            }
         }
         let share = (end - next) as f64 * width;
         next = end;

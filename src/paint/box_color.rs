@@ -100,14 +100,21 @@ fn middle_of_mean(t: f64, ds: f64, dt: f64, near: f64) -> f64 {
 }
 
 /// Mean of the inverse compression of `m + s + t`, `s` and `t` uniform with half widths `ds`, `dt`.
+#[inline]
 fn mean_of_sum(m: f64, ds: f64, dt: f64) -> f64 {
     let reach = ds + dt;
     if m - reach >= KNEE {
-        return m * m * m + m * (ds * ds + dt * dt);
+        m * m * m + m * (ds * ds + dt * dt)
+    } else if m + reach <= KNEE {
+        expand(m)
+    } else {
+        mean_across_knee(m, ds, dt)
     }
-    if m + reach <= KNEE {
-        return expand(m);
-    }
+}
+
+#[inline(never)]
+fn mean_across_knee(m: f64, ds: f64, dt: f64) -> f64 {
+    let reach = ds + dt;
     let (wide, narrow) = (ds.max(dt), ds.min(dt));
     if wide < THIN {
         gauss(m, wide, |x| gauss(x, narrow, expand))
