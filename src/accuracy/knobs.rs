@@ -109,14 +109,14 @@ fn accepted(knob: &str) -> &'static str {
     match knob {
         "preset" => "draft, standard or reference",
         "box_rule" => "moments or tight",
-        "angle_step" => "1 to 16",
+        "angle_step" => "a whole number from 1 to 16",
         "transport" => "exact, sinkhorn or greedy",
         "epsilon" => "1e-6 to 10",
         "cost" => "distance or squared",
         "order" => "canonical, sampled or cheapest",
         "precision" => "f32, f16 or 8bit",
         "draw" => "alias, inverse_cdf or both",
-        _ => "1 to 4096",
+        _ => "a whole number from 1 to 4096",
     }
 }
 
@@ -314,20 +314,35 @@ mod tests {
             ("cluster=3", "`clusters`"),
             (
                 "clusters=many",
-                "clusters is \"many\", accepted is 1 to 4096",
+                "clusters is \"many\", accepted is a whole number from 1 to 4096",
             ),
-            ("clusters=", "clusters is \"\", accepted is 1 to 4096"),
-            ("clusters=nan", "clusters is \"nan\", accepted is 1 to 4096"),
-            ("clusters=0", "clusters is 0, accepted is 1 to 4096"),
-            ("clusters=-1", "clusters is -1, accepted is 1 to 4096"),
-            ("clusters=1.5", "clusters is 1.5, accepted is 1 to 4096"),
+            (
+                "clusters=",
+                "clusters is \"\", accepted is a whole number from 1 to 4096",
+            ),
+            (
+                "clusters=nan",
+                "clusters is \"nan\", accepted is a whole number from 1 to 4096",
+            ),
+            (
+                "clusters=0",
+                "clusters is 0, accepted is a whole number from 1 to 4096",
+            ),
+            (
+                "clusters=-1",
+                "clusters is -1, accepted is a whole number from 1 to 4096",
+            ),
+            (
+                "clusters=1.5",
+                "clusters is 1.5, accepted is a whole number from 1 to 4096",
+            ),
             (
                 "clusters=99999999999",
-                "clusters is 99999999999, accepted is 1 to 4096",
+                "clusters is 99999999999, accepted is a whole number from 1 to 4096",
             ),
             (
                 "angle_step=1e99",
-                "angle_step is 1e+99, accepted is 1 to 16",
+                "angle_step is 1e+99, accepted is a whole number from 1 to 16",
             ),
             (
                 "transport=magic",

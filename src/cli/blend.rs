@@ -81,16 +81,13 @@ impl Blend {
         made::notes(picked.as_ref(), &made.notes);
         let report = made.blend.report();
         eprintln!(
-            "{}: {} · {} slices, {} clusters, mean transport {:.2}, error {}",
+            "{}: {} · {} slices, {} clusters, mean transport {:.2}{}",
             self.out.display(),
             names.join(" + "),
             report.slices,
             report.clusters,
             report.mean_cost,
-            match blend_error(&made.blend).lab {
-                Some(lab) => format!("{lab:.3} Lab"),
-                None => "not known".to_owned(),
-            }
+            made::error(&blend_error(&made.blend)),
         );
         Ok(())
     }

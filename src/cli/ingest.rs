@@ -11,6 +11,7 @@ use super::number::{real, whole};
 use super::profile::{ProfileArgs, TargetArgs};
 use super::progress::Progress;
 use super::{output, show};
+use crate::accuracy::paint_error;
 use crate::measurement::{Layout, ReadOptions, ThetaHSpacing};
 use crate::workshop::{
     IngestOptions, Laps, Source, Work, WorkshopError, describe_paint, find, ingest_in_stages,
@@ -184,7 +185,12 @@ impl Ingest {
         for warning in &paint.warnings {
             eprintln!("warning: {warning}");
         }
-        eprintln!("{}: {}", self.out.display(), show::one_line(&paint));
+        eprintln!(
+            "{}: {}{}",
+            self.out.display(),
+            show::one_line(&paint),
+            made::error(&paint_error(&paint)),
+        );
         Ok(())
     }
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde_json::{Map, json};
 
 use super::output;
+use crate::accuracy::ResultError;
 use crate::paint::Clamp;
 use crate::workshop::{Laps, Made, Picked, WorkshopError};
 
@@ -29,6 +30,18 @@ pub fn size_and_error(made: &Made) -> String {
     let lab = lab.and_then(serde_json::Value::as_f64);
     let error = lab.map_or(String::new(), |lab| format!(", error {lab:.3} Lab"));
     format!("{} bytes{error}", made.bytes.len())
+}
+
+/// How far off a result's flakes are, and where that is not known, why; nothing of a solid color.
+pub fn error(of: &ResultError) -> String {
+    match (of.lab, of.unknown()) {
+        _ if of.terms.is_empty() => String::new(),
+        (Some(lab), _) => format!(", error {lab:.3} Lab"),
+        (None, why) => format!(
+            ", error not known{}",
+            why.map_or(String::new(), |why| format!(": {why}"))
+        ),
+    }
 }
 
 /// Tells what was made: one JSON object, or notes and a last line for people.

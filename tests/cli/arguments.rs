@@ -101,13 +101,19 @@ fn a_silly_knob_is_refused_with_its_name_and_range_wherever_it_stands() {
     for (knob, told) in [
         (
             "clusters=99999999999",
-            "clusters is 99999999999, accepted is 1 to 4096",
+            "clusters is 99999999999, accepted is a whole number from 1 to 4096",
         ),
-        ("clusters=nan", "clusters is \"nan\", accepted is 1 to 4096"),
-        ("angle_step=-1", "angle_step is -1, accepted is 1 to 16"),
+        (
+            "clusters=nan",
+            "clusters is \"nan\", accepted is a whole number from 1 to 4096",
+        ),
+        (
+            "angle_step=-1",
+            "angle_step is -1, accepted is a whole number from 1 to 16",
+        ),
         (
             "samples_per_pixel=1e99",
-            "samples_per_pixel is 1e+99, accepted is 1 to 4096",
+            "samples_per_pixel is 1e+99, accepted is a whole number from 1 to 4096",
         ),
         (
             "transport=sinkhorn,epsilon=inf",
