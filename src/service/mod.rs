@@ -38,7 +38,7 @@ pub use resources::docs::interface;
 pub use samples::load_samples;
 pub use serve::{ServeError, open, router, serve};
 pub use work::{
-    Asked, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Made, Picked, Picture,
+    Asked, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, MadeFile, Picked,
     PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing, View, Works,
     Workshop, WorkshopError,
 };

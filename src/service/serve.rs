@@ -126,6 +126,10 @@ fn resources() -> Router<App> {
         )
         .route("/v1/environments/{id}/file", get(environments::file))
         .route("/v1/estimates", axum::routing::post(estimates::create))
+        .route(
+            "/v1/estimates/ingest",
+            axum::routing::post(estimates::of_upload),
+        )
         .route("/v1/accuracy", get(accuracy::show))
         .route("/v1/jobs/{id}", get(jobs::show).delete(jobs::cancel))
         .route("/v1/jobs/{id}/events", get(jobs::events))

@@ -71,13 +71,27 @@ impl Uploaded {
     /// # Errors
     ///
     /// What came of it, or [`Problem`] when the store fails.
-    pub async fn settle<T>(mut self, came: Result<T, Problem>) -> Result<T, Problem> {
+    pub async fn settle<T>(self, came: Result<T, Problem>) -> Result<T, Problem> {
+        self.end(came.is_err()).await?;
+        came
+    }
+
+    /// Ends it with nothing that would name it.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when the store fails.
+    pub async fn forget(self) -> Result<(), Problem> {
+        self.end(true).await
+    }
+
+    async fn end(mut self, forget: bool) -> Result<(), Problem> {
         self.settled = true;
         let spared = self.app.uploading.end(self.blob);
-        if spared || came.is_err() {
+        if spared || forget {
             self.app.forget_upload(self.blob).await?;
         }
-        came
+        Ok(())
     }
 }
 

@@ -9,7 +9,7 @@ use carpaint::accuracy::Profile;
 use carpaint::blend::{Blend, BlendSettings, Ingredient, RealisationWeights};
 use carpaint::paint::{CarPaint, ColorTable, Lobe, PaintFile, Provenance, certify};
 use carpaint::service::{
-    App, Asked, Estimate, Fault, Format, Gloss, IngestOrder, Made, Picked, Picture, PictureFormat,
+    App, Asked, Estimate, Fault, Format, Gloss, IngestOrder, MadeFile, Picked, PictureFormat,
     Progress, Readings, ServiceConfig, Target, Thing, View, Works, Workshop, WorkshopError, open,
     serve,
 };
@@ -112,7 +112,7 @@ impl Works for Pretend {
         weights: Option<&RealisationWeights>,
         format: Format,
         _: &Profile,
-    ) -> Result<Made, WorkshopError> {
+    ) -> Result<MadeFile, WorkshopError> {
         std::thread::sleep(Duration::from_millis(50));
         let diffuse = match thing {
             Thing::Paint(file) => file.paint.diffuse,
@@ -126,15 +126,15 @@ impl Works for Pretend {
                     .diffuse
             }
         };
-        Ok(Made {
+        Ok(MadeFile {
             bytes: format!("{format:?} {diffuse:?}").into_bytes(),
+            accuracy: "flakes-lab=0.25".to_owned(),
             report: json!({}),
-            notes: Vec::new(),
             stages: vec![("encode", Duration::from_millis(50))],
         })
     }
 
-    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Made, WorkshopError> {
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<MadeFile, WorkshopError> {
         carpaint::service::Workshop::new(carpaint::paint::Limits::default()).bundle(blend, profile)
     }
 
@@ -146,7 +146,7 @@ impl Works for Pretend {
         _: Option<&Environment>,
         format: PictureFormat,
         progress: Progress<'_>,
-    ) -> Result<Picture, WorkshopError> {
+    ) -> Result<MadeFile, WorkshopError> {
         let paint = self
             .realise(thing, weights, Format::Json, &Profile::default())?
             .bytes;
@@ -156,7 +156,7 @@ impl Works for Pretend {
             progress(0.5);
             std::thread::sleep(Duration::from_millis(5));
         }
-        Ok(Picture {
+        Ok(MadeFile {
             bytes: [format!("{format:?} {view:?} ").into_bytes(), paint].concat(),
             accuracy: "sampling-mean-de2000=0.5".to_owned(),
             report: json!({ "clamps": [], "plan": "whatever" }),

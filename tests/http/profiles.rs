@@ -121,7 +121,11 @@ async fn profiles_are_names_or_knobs_and_targets_are_answered_with_what_was_pick
         let house = &house;
         async move { house.get(&path).await }
     };
-    assert_eq!(written("distance").await.status, 200);
+    let file = written("distance").await;
+    assert_eq!(
+        (file.status, file.header("carpaint-accuracy")),
+        (200, Some("flakes-lab=0.25"))
+    );
     let settled = written("squared").await;
     let settled = settled.problem(400, "invalid-parameter");
     assert_eq!(

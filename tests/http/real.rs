@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use crate::client::Answer;
 use crate::house::House;
+use crate::walk;
 
 /// A table in the layout of the MPI car paints: a wide lobe over a diffuse base.
 fn table(diffuse: f32) -> Vec<u8> {
@@ -337,5 +338,45 @@ async fn a_refused_package_is_pointed_into() {
         assert_eq!(problem["file"], file, "{problem}");
         assert_eq!(problem["pointer"], pointer, "{problem}");
     }
+    house.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_ingest_of_a_new_measurement_is_estimated_and_nothing_of_it_is_kept() {
+    let data = tempfile::tempdir().expect("temporary folder");
+    let house = House::real(data.path()).await;
+    let estimate = async |query: &str, bytes: &[u8]| {
+        let path = format!("/v1/estimates/ingest?{query}");
+        house.ask("POST", &path, &[], bytes).await
+    };
+    let new = table(0.1);
+    let told = estimate("profile=draft", &new).await;
+    assert_eq!(told.status, 200, "{}", told.text());
+    let told = told.json();
+    assert_eq!(told["profile"], "draft");
+    assert!(told["seconds"].as_f64().is_some_and(|s| s > 0.0), "{told}");
+    assert!(told["bytes"].as_u64().is_some_and(|b| b > 100), "{told}");
+    let met = estimate("max_seconds=100", &new).await.json();
+    assert_eq!(met["met"], true, "{met}");
+    assert_eq!(walk(&data.path().join("blobs")), 0, "nothing is kept");
+    assert_eq!(house.get("/v1/paints").await.json()["paints"], json!([]));
+
+    // What is there already stays.
+    let kept = upload(&house, &new).await;
+    let before = walk(&data.path().join("blobs"));
+    assert_eq!(estimate("", &new).await.status, 200);
+    assert_eq!(walk(&data.path().join("blobs")), before);
+    let measurement = format!(
+        "/v1/paints/{}/measurement",
+        kept["id"].as_str().expect("an id")
+    );
+    assert_eq!(house.get(&measurement).await.body, new);
+
+    let none = estimate("", b"no measurement").await;
+    none.problem(422, "unusable-measurement");
+    let knob = estimate("profile=clusters=0", &new).await;
+    let problem = knob.problem(400, "invalid-parameter");
+    assert_eq!(problem["pointer"], "/profile");
+    assert_eq!(walk(&data.path().join("blobs")), before);
     house.close().await;
 }

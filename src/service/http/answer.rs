@@ -39,6 +39,9 @@ impl Keep {
     }
 }
 
+/// How accurate an answer's content is: it belongs to the content, so it is kept with it.
+const ACCURACY: HeaderName = HeaderName::from_static("carpaint-accuracy");
+
 /// An answer with its content.
 #[derive(Debug)]
 pub struct Answer {
@@ -139,6 +142,16 @@ impl Answer {
             self.headers.insert(name, value);
         }
         self
+    }
+
+    /// With how accurate the content is. What is exact says nothing.
+    #[must_use]
+    pub fn accuracy(self, accuracy: &str) -> Self {
+        if accuracy.is_empty() {
+            self
+        } else {
+            self.header(ACCURACY, accuracy)
+        }
     }
 
     /// With the time that a stage took.

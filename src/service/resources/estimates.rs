@@ -4,24 +4,28 @@ mod order;
 
 use std::sync::Arc;
 
-use axum::extract::State;
+use axum::extract::{Request, State};
 use serde::Serialize;
 use utoipa::ToSchema;
 
 pub use self::order::EstimateOrder;
 use self::order::WorkName;
+use super::uploads::{self, IngestQuery};
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::PaintFile;
 use crate::service::app::App;
 use crate::service::environments::Unread;
-use crate::service::http::{Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument, Problems};
+use crate::service::http::{
+    Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument, Problems, Query,
+};
 use crate::service::parameters::{of_field, targets};
 use crate::service::shelf::Shelved;
 use crate::service::work::{
-    Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, View, WorkshopError,
+    Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, Target, View, Works,
+    WorkshopError, runner,
 };
-use crate::store::LocalBlob;
+use crate::store::{Hash, LocalBlob};
 use crate::workshop::{Environment, EstimatedError, Stage};
 
 /// What a request will take.
@@ -114,26 +118,82 @@ pub async fn create(
         })
     };
     let estimated = app.bench.run(move || {
-        let estimate = |asked: &Asked<'_>| {
-            if target.is_some() {
-                let picked = works.pick(asked, &target)?;
-                Ok((picked.estimate, Some((picked.met, picked.searched))))
-            } else {
-                works.estimate(asked, &profile).map(|made| (made, None))
-            }
-        };
         let environment = needed.environment().map_err(Problem::in_body)?;
+        let estimate =
+            |asked: &Asked<'_>| EstimateDocument::made(&*works, asked, &profile, &target);
         let done = needed.with_asked(environment.as_deref(), estimate);
         done.map_err(told)
     });
-    let (estimate, picked) = estimated.await??;
-    Ok(Answer::json(
-        &EstimateDocument::of(&estimate, picked),
-        Keep::Never,
-    ))
+    Ok(Answer::json(&estimated.await??, Keep::Never))
+}
+
+/// Estimate the ingest of a new measurement.
+///
+/// The body and the parameters are those of an upload to `/v1/paints`: the file itself. A few of its angles are fitted, here
+/// and now, and the rest is reckoned from them. Nothing is kept.
+#[utoipa::path(
+    post, operation_id = "estimate_upload", path = "/v1/estimates/ingest", tag = "accuracy", params(IngestQuery),
+    request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "The measurement"),
+    responses(
+        (status = 200, description = "Seconds, bytes and error", body = EstimateDocument),
+        (status = 413, description = "The measurement is too large", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "The body is no measurement, or a damaged one", body = ProblemDocument, content_type = "application/problem+json"),
+        Problems,
+    )
+)]
+pub async fn of_upload(
+    State(app): State<App>,
+    query: Result<Query<IngestQuery>, Problem>,
+    request: Request,
+) -> Result<Answer, Problem> {
+    let ((order, target), (), received) = uploads::take_in(&app, query, Ok(()), request).await?;
+    let estimated = runner::to_its_end(async move {
+        let uploaded = app.uploaded(received).await?;
+        let estimated = look_at(&app, uploaded.blob(), order, target).await;
+        uploaded.forget().await?;
+        estimated
+    });
+    Ok(Answer::json(&estimated.await?, Keep::Never))
+}
+
+async fn look_at(
+    app: &App,
+    upload: Hash,
+    order: IngestOrder,
+    target: Target,
+) -> Result<EstimateDocument, Problem> {
+    let local = app.blobs.local(upload).await?;
+    let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
+    let works = Arc::clone(&app.works);
+    let estimated = app.bench.run(move || {
+        let asked = Asked::Ingest {
+            upload: local.path(),
+            order: &order,
+        };
+        let folder = local.path().display().to_string();
+        EstimateDocument::made(&*works, &asked, &order.profile, &target)
+            .map_err(|error| Problem::of_upload(error.without(&folder)))
+    });
+    estimated.await?
 }
 
 impl EstimateDocument {
+    /// The estimate of work with this profile, or with the one that is picked for a target.
+    fn made(
+        works: &dyn Works,
+        asked: &Asked<'_>,
+        profile: &Profile,
+        target: &Target,
+    ) -> Result<Self, WorkshopError> {
+        if target.is_some() {
+            let picked = works.pick(asked, target)?;
+            let found = Some((picked.met, picked.searched));
+            Ok(Self::of(&picked.estimate, found))
+        } else {
+            Ok(Self::of(&works.estimate(asked, profile)?, None))
+        }
+    }
+
     fn of(estimate: &Estimate, picked: Option<(bool, f64)>) -> Self {
         Self {
             profile: estimate.profile,

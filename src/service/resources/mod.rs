@@ -10,6 +10,7 @@ pub mod docs;
 pub mod documents;
 pub mod environments;
 pub mod estimates;
+mod files;
 pub mod home;
 pub mod jobs;
 mod making;

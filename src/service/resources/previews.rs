@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::extract::{RawQuery, State};
-use axum::http::{HeaderName, header};
+use axum::http::header;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -254,9 +254,6 @@ fn report_link(address: &str, query: Option<&str>) -> String {
     format!("<{address}/preview.json{query}>; rel=\"describedby\"; type=\"application/json\"")
 }
 
-/// How accurate a picture is: it belongs to the picture, so it is kept with it.
-const ACCURACY: HeaderName = HeaderName::from_static("carpaint-accuracy");
-
 fn answer(drawn: Drawn, format: PreviewFormat, picked: Option<&Picked>) -> Answer {
     // What a target picks may change with the machine's load.
     let keep = if picked.is_some() {
@@ -265,15 +262,11 @@ fn answer(drawn: Drawn, format: PreviewFormat, picked: Option<&Picked>) -> Answe
         drawn.keep
     };
     let answer = match format {
-        PreviewFormat::Json => Answer::bytes("application/json", drawn.report, keep),
-        _ => Answer::result(format.drawn().media_type(), drawn.picture, keep),
-    };
-    let answer = match drawn.accuracy.as_str() {
-        // Angles are exact.
-        "" => answer,
-        accuracy => answer.header(ACCURACY, accuracy),
+        PreviewFormat::Json => Answer::bytes("application/json", drawn.kept.report, keep),
+        _ => Answer::result(format.drawn().media_type(), drawn.kept.file, keep),
     };
     answer
+        .accuracy(&drawn.kept.accuracy)
         .picked(picked)
         .stages(&drawn.stages)
         .stage("preview", drawn.time)

@@ -1,10 +1,10 @@
 //! Realisations: a paint, or a blend at some weights, as a file that others use.
 
-use std::sync::{Arc, OnceLock};
-use std::time::Instant;
+use std::sync::Arc;
 
 use axum::extract::State;
 
+use super::files::FileAnswer;
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::http::{
@@ -13,7 +13,7 @@ use crate::service::http::{
 use crate::service::ids;
 use crate::service::parameters::{ProfileQuery, WeightQuery};
 use crate::service::shelf::Shelved;
-use crate::service::work::{Asked, Format};
+use crate::service::work::{Asked, Format, Works};
 
 /// A blend at some weights, as a file.
 ///
@@ -24,7 +24,8 @@ use crate::service::work::{Asked, Format};
     params(("id" = String, Path, description = "Blend"), ("format" = Format, Path, description = "File"), WeightQuery, ProfileQuery),
     responses(
         (status = 200, description = "The file", headers(
-            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated")), content(
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
+            ("Carpaint-Accuracy" = String, description = "Error of the flakes, Lab, where it is known; of a GLB what its material loses, CIEDE2000 in the median of the instrument geometries")), content(
             (Vec<u8> = "application/zip"), (Vec<u8> = "model/gltf-binary"), (serde_json::Value = "application/json"),
             (Vec<u8> = "application/vnd.carpaint.paint"))),
         (status = 400, description = "Weights that do not fit the blend", body = ProblemDocument, content_type = "application/problem+json"),
@@ -47,7 +48,8 @@ pub async fn of_blend(
     params(("id" = String, Path, description = "Paint"), ("format" = Format, Path, description = "File"), ProfileQuery),
     responses(
         (status = 200, description = "The file", headers(
-            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated")), content(
+            ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
+            ("Carpaint-Accuracy" = String, description = "Error of the flakes, Lab, where it is known; of a GLB what its material loses, CIEDE2000 in the median of the instrument geometries")), content(
             (Vec<u8> = "application/zip"), (Vec<u8> = "model/gltf-binary"), (serde_json::Value = "application/json"),
             (Vec<u8> = "application/vnd.carpaint.paint"))),
         PaintProblems,
@@ -80,39 +82,19 @@ async fn realise(
         works.pick(&asked, target)
     });
     let (profile, picked) = found.await?;
-    let begun = Instant::now();
-    let key = ids::result(
-        "realisation",
-        &(&thing.id, thing.file, &weights, format, profile.export),
-    );
-    let name = format!("{}.{}", thing.id, format.ending());
-    let keep = thing.keep();
-    let took = Arc::new(OnceLock::new());
-    let (on, told) = (app.clone(), Arc::clone(&took));
-    let compute = move || async move {
-        let (works, counter) = (
-            Arc::clone(&on.works),
-            on.metrics.realisations_computed.clone(),
-        );
-        let made = on
-            .bench
-            .run(move || works.realise(&thing.thing, weights.as_ref(), format, &profile))
-            .await?;
-        let made = made.map_err(Problem::of_query)?;
-        let _ = told.set(made.stages);
-        counter.increment(1);
-        Ok(made.bytes.into())
+    let answer = FileAnswer {
+        key: ids::result(
+            "realisation",
+            &(&thing.id, thing.file, &weights, format, profile.export),
+        ),
+        media_type: format.media_type(),
+        name: format!("{}.{}", thing.id, format.ending()),
+        keep: thing.keep(),
+        picked: picked.as_ref(),
+        stage: "realisation",
+        counter: app.metrics.realisations_computed.clone(),
     };
-    let result = app.results.get_or_compute(key, compute).await?;
-    // What a target picks may change with the machine's load.
-    let keep = if picked.is_some() {
-        keep.revalidated()
-    } else {
-        keep
-    };
-    let answer = Answer::result(format.media_type(), result, keep).saved_as(&name);
-    Ok(answer
-        .picked(picked.as_ref())
-        .stages(took.get().map_or(&[], Vec::as_slice))
-        .stage("realisation", begun.elapsed()))
+    let work =
+        move |works: &dyn Works| works.realise(&thing.thing, weights.as_ref(), format, &profile);
+    answer.make(app, work).await
 }

@@ -61,7 +61,7 @@ pub struct IngestQuery {
 }
 
 impl IngestQuery {
-    fn order(self) -> Result<IngestOrder, Problem> {
+    fn order(self) -> Result<(IngestOrder, Target), Problem> {
         if let Some(name) = &self.name
             && (!NAME_CHARACTERS.contains(&name.chars().count())
                 || name.chars().any(char::is_control))
@@ -87,8 +87,10 @@ impl IngestQuery {
                     .accepting("0 to 1048576"),
             );
         }
+        let instead = self.profile.is_some() || self.clusters.is_some();
+        let target = targets::of_query(self.max_error, self.max_seconds, instead)?;
         let asked = self.profile.unwrap_or_default();
-        Ok(IngestOrder {
+        let order = IngestOrder {
             name: self.name,
             layout: self.layout,
             theta_h: self.theta_h,
@@ -96,7 +98,8 @@ impl IngestQuery {
             coat_ior: self.coat_ior,
             clusters: self.clusters.or(asked.0.clusters),
             profile: asked.with_clusters(self.clusters).of_query()?,
-        })
+        };
+        Ok((order, target))
     }
 }
 
@@ -133,34 +136,42 @@ pub async fn upload(
     idempotency: Result<Idempotency, Problem>,
     request: Request,
 ) -> Result<Response, Problem> {
-    let (parts, body) = request.into_parts();
-    let target = query.as_ref().map_or_else(
-        |_| Ok(Target::default()),
-        |Query(q)| {
-            targets::of_query(
-                q.max_error,
-                q.max_seconds,
-                q.profile.is_some() || q.clusters.is_some(),
-            )
-        },
-    );
-    let order = query.and_then(|Query(query)| Ok((query.order()?, target?)));
-    let order = order.and_then(|order| {
-        receiving::check_headers(&app, &MEASUREMENT, &parts.headers).map(|()| order)
-    });
-    let (order, idempotency) = match order.and_then(|order| Ok((order, idempotency?))) {
-        Ok(asked) => asked,
-        Err(problem) => {
-            receiving::drain(body.into_data_stream()).await;
-            return Err(problem);
-        }
-    };
-    let received = receiving::receive(&app, body, &MEASUREMENT).await?;
+    let (order, idempotency, received) = take_in(&app, query, idempotency, request).await?;
     let accepted = runner::to_its_end(accept(app.clone(), received, order, idempotency)).await?;
     let Accepted { id, job, picked } = accepted;
     let address = format!("/v1/paints/{id}");
     let made = || app.paint(&id);
     making::answer(&app, prefer, job, &address, picked.as_ref(), made).await
+}
+
+/// Takes in a measurement that is not refused by its query, by what is said `beside` it, or by its headers.
+///
+/// # Errors
+///
+/// [`Problem`] of those, or as [`receiving::receive`].
+pub async fn take_in<T>(
+    app: &App,
+    query: Result<Query<IngestQuery>, Problem>,
+    beside: Result<T, Problem>,
+    request: Request,
+) -> Result<((IngestOrder, Target), T, Box<dyn BlobWriter>), Problem> {
+    let (parts, body) = request.into_parts();
+    let asked = query
+        .and_then(|Query(query)| query.order())
+        .and_then(|order| {
+            receiving::check_headers(app, &MEASUREMENT, &parts.headers)?;
+            Ok((order, beside?))
+        });
+    match asked {
+        Ok((order, beside)) => {
+            let received = receiving::receive(app, body, &MEASUREMENT).await?;
+            Ok((order, beside, received))
+        }
+        Err(problem) => {
+            receiving::drain(body.into_data_stream()).await;
+            Err(problem)
+        }
+    }
 }
 
 /// An upload that was kept.

@@ -5,25 +5,22 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+use super::kept_file::KeptFile;
 use super::workbench::call_off;
-use super::works::{Lap, Picture, PictureFormat, Show, View};
+use super::works::{Lap, PictureFormat, Show, View};
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::environments::Unread;
 use crate::service::http::{Keep, Kind, Problem};
 use crate::service::ids;
 use crate::service::shelf::Shelved;
-use crate::store::{CachedResult, Hash};
+use crate::store::Hash;
 
 /// A picture that was drawn, now or before.
 #[derive(Debug)]
 pub struct Drawn {
-    /// How accurate it is, as the value of a header.
-    pub accuracy: String,
-    /// The report on it, JSON.
-    pub report: Bytes,
-    /// The file.
-    pub picture: CachedResult,
+    /// The picture and what is told about it.
+    pub kept: KeptFile,
     /// How long it may be kept.
     pub keep: Keep,
     /// How long each stage took, where it was drawn now.
@@ -84,7 +81,7 @@ pub async fn draw(
                     (&thing.thing, weights.as_ref(), environment.as_deref());
                 let drawn = works.preview(thing, weights, &view, light, format, &progress);
                 let drawn = drawn.map_err(Problem::of_query)?;
-                let kept = kept_form(&drawn);
+                let kept = KeptFile::form(&drawn);
                 let _ = told.set(drawn.stages);
                 Ok(kept)
             });
@@ -107,37 +104,10 @@ pub async fn draw(
             kept => break kept?,
         }
     };
-    let (accuracy, report, picture) = split(&kept)?;
     Ok(Drawn {
-        accuracy,
-        report,
-        picture,
+        kept: KeptFile::of(&kept)?,
         keep,
         stages: took.get().cloned().unwrap_or_default(),
         time: begun.elapsed(),
     })
-}
-
-/// What is kept of a picture: a line of its accuracy, a line of its report as JSON, the file.
-fn kept_form(picture: &Picture) -> Bytes {
-    let head = format!("{}\n{}\n", picture.accuracy, picture.report);
-    [head.as_bytes(), &picture.bytes].concat().into()
-}
-
-/// Accuracy, report and picture of what was kept.
-fn split(kept: &CachedResult) -> Result<(String, Bytes, CachedResult), Problem> {
-    let line_end = |from: usize| {
-        let end = kept.bytes[from..].iter().position(|&byte| byte == b'\n');
-        end.map(|end| from + end)
-            .ok_or_else(|| Problem::internal("a kept picture without its report"))
-    };
-    let first = line_end(0)?;
-    let second = line_end(first + 1)?;
-    let picture = CachedResult {
-        // The hash of all three tells pictures apart as surely as that of one.
-        hash: kept.hash,
-        bytes: kept.bytes.slice(second + 1..),
-    };
-    let accuracy = String::from_utf8_lossy(&kept.bytes[..first]).into_owned();
-    Ok((accuracy, kept.bytes.slice(first + 1..second), picture))
 }

@@ -12,6 +12,7 @@ pub mod colors;
 pub mod drawing;
 mod ingesting;
 mod job_document;
+mod kept_file;
 mod picks;
 pub mod runner;
 mod under_way;
@@ -23,13 +24,14 @@ mod workshop;
 pub use blending::{BlendOptions, BlendRequest};
 pub use ingesting::IngestRequest;
 pub use job_document::JobDocument;
+pub use kept_file::KeptFile;
 pub use picks::{Picks, TargetDocument};
 pub use runner::Jobs;
 pub use watchers::Watchers;
 pub use workbench::{Workbench, call_off};
 pub use works::{
-    Asked, CXF_MEDIA_TYPE, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, Made,
-    Picked, Picture, PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing,
-    View, Works, WorkshopError,
+    Asked, CXF_MEDIA_TYPE, Estimate, Fault, Format, Gloss, IngestOrder, Layout, Light, MadeFile,
+    Picked, PictureFormat, Progress, Readings, Shape, Show, Target, ThetaHSpacing, Thing, View,
+    Works, WorkshopError,
 };
 pub use workshop::Workshop;

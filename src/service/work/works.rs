@@ -16,8 +16,8 @@ pub type Progress<'a> = &'a (dyn Fn(f32) + Sync);
 
 pub use crate::measurement::{Layout, ThetaHSpacing};
 pub use crate::workshop::{
-    CXF_MEDIA_TYPE, Estimate, Fault, Format, Gloss, Lap, Light, Made, Picked, PictureFormat,
-    Readings, Shape, Show, Target, Thing, WorkshopError,
+    CXF_MEDIA_TYPE, Estimate, Fault, Format, Gloss, Lap, Light, Picked, PictureFormat, Readings,
+    Shape, Show, Target, Thing, WorkshopError,
 };
 
 /// How an upload becomes a paint.
@@ -103,14 +103,14 @@ pub enum Asked<'a> {
     },
 }
 
-/// A picture with the account of its accuracy.
+/// A file with the account of its accuracy.
 #[derive(Clone, Debug)]
-pub struct Picture {
+pub struct MadeFile {
     /// The file.
     pub bytes: Vec<u8>,
-    /// How accurate it is, as the value of a header: the same for the same picture.
+    /// How accurate it is, as the value of a header: the same for the same file. Empty for what is exact.
     pub accuracy: String,
-    /// What was drawn and what was left out, what had to be clamped.
+    /// What is in it, what was left out, what had to be clamped.
     pub report: Value,
     /// How long each stage took.
     pub stages: Vec<Lap>,
@@ -154,14 +154,14 @@ pub trait Works: Debug + Send + Sync {
         weights: Option<&RealisationWeights>,
         format: Format,
         profile: &Profile,
-    ) -> Result<Made, WorkshopError>;
+    ) -> Result<MadeFile, WorkshopError>;
 
     /// All paints of a blend become one texture bundle.
     ///
     /// # Errors
     ///
     /// [`WorkshopError`] for a thing that is no blend.
-    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Made, WorkshopError>;
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<MadeFile, WorkshopError>;
 
     /// A paint, or a blend at some weights, becomes a picture, lit by the environment that the view names.
     ///
@@ -176,7 +176,7 @@ pub trait Works: Debug + Send + Sync {
         environment: Option<&Environment>,
         format: PictureFormat,
         progress: Progress<'_>,
-    ) -> Result<Picture, WorkshopError>;
+    ) -> Result<MadeFile, WorkshopError>;
 
     /// A paint is read by a virtual multi-angle instrument, at its own angles where none are given.
     ///

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::works::{
-    Asked, Estimate, Format, Gloss, IngestOrder, Made, Picked, Picture, PictureFormat, Progress,
+    Asked, Estimate, Format, Gloss, IngestOrder, MadeFile, Picked, PictureFormat, Progress,
     Readings, Target, Thing, View, Works,
 };
 use crate::accuracy::{Knobs, Profile};
@@ -13,7 +13,7 @@ use crate::blend::{Blend, RealisationWeights};
 use crate::measurement::ReadOptions;
 use crate::paint::{Limits, PaintFile};
 use crate::workshop::{
-    self, Environment, IngestOptions, PictureWork, PreviewOptions, Work, WorkshopError,
+    self, Environment, IngestOptions, Made, PictureWork, PreviewOptions, Work, WorkshopError,
 };
 
 /// Does the work, within limits.
@@ -108,6 +108,31 @@ fn options_of(view: &View, environment: Option<&Environment>) -> PreviewOptions 
     }
 }
 
+/// Figures of reports that headers tell: their names there, and where they stand.
+const FIGURES: [(&str, &str); 7] = [
+    ("picture-de2000", "/picture_error/delta_e_2000"),
+    ("sampling-mean-de2000", "/rendering/sampling/mean_delta_e"),
+    ("sampling-p95-de2000", "/rendering/sampling/p95_delta_e"),
+    ("sampling-flip", "/rendering/sampling/flip_between_drawings"),
+    ("flakes-lab", "/error/lab"),
+    ("flakes-lab", "/accuracy/error/lab"),
+    ("gltf-median-de2000", "/accuracy/gltf_loss/median"),
+];
+
+/// A file with what of its report headers tell.
+fn told(made: Made) -> MadeFile {
+    let figures = FIGURES.iter().filter_map(|(name, path)| {
+        let value = made.report.pointer(path)?.as_f64()?;
+        Some(format!("{name}={value:.4}"))
+    });
+    MadeFile {
+        accuracy: figures.collect::<Vec<_>>().join(", "),
+        bytes: made.bytes,
+        report: made.report,
+        stages: made.stages,
+    }
+}
+
 impl Works for Workshop {
     fn ingest(
         &self,
@@ -135,12 +160,12 @@ impl Works for Workshop {
         weights: Option<&RealisationWeights>,
         format: Format,
         profile: &Profile,
-    ) -> Result<Made, WorkshopError> {
-        workshop::realise(thing, weights, format, profile)
+    ) -> Result<MadeFile, WorkshopError> {
+        workshop::realise(thing, weights, format, profile).map(told)
     }
 
-    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<Made, WorkshopError> {
-        workshop::bundle_blend(blend, profile)
+    fn bundle(&self, blend: &Thing, profile: &Profile) -> Result<MadeFile, WorkshopError> {
+        workshop::bundle_blend(blend, profile).map(told)
     }
 
     fn preview(
@@ -151,26 +176,9 @@ impl Works for Workshop {
         environment: Option<&Environment>,
         format: PictureFormat,
         progress: Progress<'_>,
-    ) -> Result<Picture, WorkshopError> {
+    ) -> Result<MadeFile, WorkshopError> {
         let options = options_of(view, environment);
-        let made = workshop::preview(thing, weights, &options, format, &self.limits, progress)?;
-        let number = |path: &str| made.report.pointer(path).and_then(Value::as_f64);
-        let mut accuracy = Vec::new();
-        for (name, path) in [
-            ("picture-de2000", "/picture_error/delta_e_2000"),
-            ("sampling-mean-de2000", "/rendering/sampling/mean_delta_e"),
-            ("sampling-p95-de2000", "/rendering/sampling/p95_delta_e"),
-            ("sampling-flip", "/rendering/sampling/flip_between_drawings"),
-            ("flakes-lab", "/error/lab"),
-        ] {
-            accuracy.extend(number(path).map(|value| format!("{name}={value:.4}")));
-        }
-        Ok(Picture {
-            bytes: made.bytes,
-            accuracy: accuracy.join(", "),
-            report: made.report,
-            stages: made.stages,
-        })
+        workshop::preview(thing, weights, &options, format, &self.limits, progress).map(told)
     }
 
     fn readings(

@@ -34,7 +34,7 @@ const POLICY: &str =
         readings::show, readings::table, readings::document, realisations::of_blend, realisations::of_paint,
         previews::of_blend, previews::of_paint, previews::create,
         environments::upload, environments::list, environments::show, environments::file, environments::delete,
-        estimates::create, accuracy::show,
+        estimates::create, estimates::of_upload, accuracy::show,
         jobs::show, jobs::events, jobs::cancel,
         operations::healthz, operations::readyz, operations::metrics,
     ),

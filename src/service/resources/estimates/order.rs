@@ -14,7 +14,7 @@ use crate::service::work::{Format, Light, PictureFormat, Shape, Show, View};
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EstimateOrder {
-    /// `ingest` (again, of a paint that was uploaded as a measurement), `blend`, `realise`, `bundle` or `preview`.
+    /// `ingest` (again, of a paint that was uploaded as a measurement; of a new one `POST /v1/estimates/ingest`), `blend`, `realise`, `bundle` or `preview`.
     pub work: WorkName,
     /// Id of the paint to ingest again, or to write or draw.
     pub paint: Option<String>,
