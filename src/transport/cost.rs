@@ -116,11 +116,18 @@ impl CostMatrix {
         // All points in one place: every cost is 0 whatever epsilon, as long as it is finite.
         let epsilon = TIE_BREAK / diagonal.max(1e-200);
         let tilted = |squared: f64| squared.sqrt() + epsilon * squared;
+        let matrix = self;
         match cost {
-            Cost::Distance => pulp::Arch::new().dispatch(Rows(self, sources, tilted)),
-            Cost::SquaredDistance => {
-                pulp::Arch::new().dispatch(Rows(self, sources, |squared| squared));
-            }
+            Cost::Distance => pulp::Arch::new().dispatch(Rows {
+                matrix,
+                sources,
+                cost: tilted,
+            }),
+            Cost::SquaredDistance => pulp::Arch::new().dispatch(Rows {
+                matrix,
+                sources,
+                cost: |squared| squared,
+            }),
         }
     }
 
@@ -160,15 +167,24 @@ impl CostMatrix {
     }
 }
 
-/// The rows of a matrix from its sources and a cost of the squared distance, compiled for wide registers too.
-struct Rows<'a, F>(&'a mut CostMatrix, &'a Cloud, F);
+/// The rows of a matrix, compiled for wide registers too.
+struct Rows<'a, F> {
+    matrix: &'a mut CostMatrix,
+    sources: &'a Cloud,
+    /// Cost of a squared distance.
+    cost: F,
+}
 
 impl<F: Fn(f64) -> f64> pulp::NullaryFnOnce for Rows<'_, F> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let Self(matrix, sources, cost) = self;
+        let Self {
+            matrix,
+            sources,
+            cost,
+        } = self;
         let CostMatrix {
             lanes,
             stride,
@@ -207,5 +223,78 @@ impl<F: Fn(f64) -> f64> pulp::NullaryFnOnce for Rows<'_, F> {
             *mean = sums.iter().sum();
             row.as_flattened_mut()[*targets..].fill(f64::INFINITY);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pulp::NullaryFnOnce;
+
+    fn scattered(sources: u32, targets: u32) -> Problem {
+        let at = |k: u32| {
+            [
+                f64::from(k * 7 % 11),
+                f64::from(k * k % 13),
+                f64::from(k) / 3.0,
+            ]
+        };
+        let cloud = |n: u32, from: u32| -> (Vec<_>, Vec<_>) {
+            (from..from + n)
+                .map(|k| (at(k), f64::from(1 + k % 5)))
+                .unzip()
+        };
+        let ((from, supplies), (to, demands)) = (cloud(sources, 0), cloud(targets, 40));
+        Problem::new(&from, &supplies, &to, &demands).expect("a fine problem")
+    }
+
+    #[test]
+    fn costs_and_means_are_those_of_plain_loops_however_many_points_fill_a_row() {
+        for (ns, nt) in [(1, 1), (3, 7), (5, 8), (4, 9), (9, 17)] {
+            let problem = scattered(ns, nt);
+            let (from, to) = (problem.source(), problem.target());
+            for cost in [Cost::Distance, Cost::SquaredDistance] {
+                let mut matrix = CostMatrix::default();
+                // Twice: nothing of a larger problem shows.
+                for problem in [&scattered(12, 30), &problem] {
+                    matrix.fill(problem, cost);
+                }
+                let near = |x: f64, y: f64| (x - y).abs() <= 1e-8 * (1.0 + y.abs());
+                let plain = |i: usize, j: usize| cost.between(from.points()[i], to.points()[j]);
+                for i in 0..from.len() {
+                    let costs: Vec<f64> = (0..to.len()).map(|j| plain(i, j)).collect();
+                    let row = matrix.row(i).as_flattened();
+                    assert!(row.iter().zip(&costs).all(|(x, y)| near(*x, *y)));
+                    assert!(row[to.len()..].iter().all(|cost| *cost == f64::INFINITY));
+                    let mean = costs.iter().zip(to.masses()).map(|(c, m)| c * m).sum();
+                    assert!(near(matrix.source_means()[i], mean));
+                }
+                let means = matrix.target_means().as_flattened();
+                for j in 0..to.len() {
+                    let costs = (0..from.len()).map(|i| plain(i, j) * from.masses()[i]);
+                    assert!(near(means[j], costs.sum()));
+                }
+                assert!(means.iter().all(|mean| mean.is_finite()));
+            }
+        }
+    }
+
+    #[test]
+    fn every_width_of_registers_gives_the_same_bits() {
+        let problem = scattered(23, 37);
+        let mut wide = CostMatrix::default();
+        wide.fill(&problem, Cost::SquaredDistance);
+        let mut plain = wide.clone();
+        plain.lanes.as_flattened_mut().fill(0.0);
+        plain.target_means.as_flattened_mut().fill(0.0);
+        Rows {
+            matrix: &mut plain,
+            sources: problem.source(),
+            cost: |squared| squared,
+        }
+        .call();
+        assert_eq!(plain.lanes, wide.lanes);
+        assert_eq!(plain.source_means, wide.source_means);
+        assert_eq!(plain.target_means, wide.target_means);
     }
 }

@@ -27,7 +27,7 @@ const PRICE_TOLERANCE: f64 = 4e-15;
 /// alone drive the pivots ends soon after, and its gap tells.
 const PATIENCE: usize = 20;
 
-/// Pivots after which the method is given up, per point. Paint slices of 50 clusters take 1 to 3.
+/// Pivots after which the method is given up, per point. Paint slices of 50 clusters take about 1.
 const MOST_PIVOTS_PER_POINT: usize = 400;
 
 /// The exact solver.
