@@ -27,26 +27,7 @@ impl Textures {
     }
 
     fn alias(&mut self, flakes: &Flakes, width: usize) -> Result<(), ExportError> {
-        let mut slots = alias::Slots::default();
-        let texels = flakes.clusters().next_multiple_of(width);
-        let mut threshold = vec![1.0; texels];
-        let mut alias = Vec::with_capacity(texels);
-        for range in flakes.offsets.windows(2) {
-            let first = alias.len();
-            let range = range[0] as usize..range[1] as usize;
-            #[allow(clippy::cast_precision_loss)] // below 2^24, exact
-            alias.extend((0..range.len()).map(|cluster| cluster as f32));
-            let (threshold, alias) = (&mut threshold[first..], &mut alias[first..]);
-            slots.share(&flakes.probability[range], |slot, share, other| {
-                #[allow(clippy::cast_possible_truncation)] // texel precision
-                let share = share as f32;
-                threshold[slot as usize] = share;
-                #[allow(clippy::cast_precision_loss)] // below 2^24, exact
-                let other = other as f32;
-                alias[slot as usize] = other;
-            });
-        }
-        alias.resize(texels, 0.0);
+        let [threshold, alias] = alias_planes(flakes, flakes.clusters().next_multiple_of(width));
         let about = "alias table of every slice: threshold (R, 0 to 1) and alias (G, cluster within the slice)";
         self.floats("alias", width, &[("R", &threshold), ("G", &alias)], about)
     }
@@ -98,5 +79,54 @@ impl Textures {
             self.slice_losses.push(loss.map(|v| v as f32));
         }
         index
+    }
+}
+
+/// Thresholds and aliases of all slices, slice after slice; whole slots beyond.
+fn alias_planes(flakes: &Flakes, texels: usize) -> [Vec<f32>; 2] {
+    let mut slots = alias::Slots::default();
+    let mut threshold = vec![1.0; texels];
+    let mut alias = Vec::with_capacity(texels);
+    for range in flakes.offsets.windows(2) {
+        let first = alias.len();
+        let range = range[0] as usize..range[1] as usize;
+        #[allow(clippy::cast_precision_loss)] // below 2^24, exact
+        alias.extend((0..range.len()).map(|cluster| cluster as f32));
+        let (threshold, alias) = (&mut threshold[first..], &mut alias[first..]);
+        slots.share(&flakes.probability[range], |slot, share, other| {
+            #[allow(clippy::cast_possible_truncation)] // texel precision
+            let share = share as f32;
+            threshold[slot as usize] = share;
+            #[allow(clippy::cast_precision_loss)] // below 2^24, exact
+            let other = other as f32;
+            alias[slot as usize] = other;
+        });
+    }
+    alias.resize(texels, 0.0);
+    [threshold, alias]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::made_up::metallic;
+
+    #[test]
+    fn planes_hold_the_alias_table_of_every_slice_in_turn() {
+        for clusters in [1, 20] {
+            let paint = metallic(4, 3, clusters);
+            let flakes = paint.flakes.expect("a metallic");
+            let texels = flakes.clusters() + 3;
+            let [threshold, alias] = alias_planes(&flakes, texels);
+            let tables = (0..flakes.slices())
+                .flat_map(|k| alias::alias_table(flakes.slice_at(k).probability));
+            for (k, entry) in tables.enumerate() {
+                #[allow(clippy::cast_possible_truncation)] // as the texture has it
+                let wanted = entry.threshold as f32;
+                assert_eq!((threshold[k], alias[k]), (wanted, entry.alias as f32));
+            }
+            assert_eq!(threshold[flakes.clusters()..], [1.0; 3]);
+            assert_eq!(alias.len(), texels);
+        }
     }
 }

@@ -67,6 +67,7 @@ pub(super) fn write<T: Step>(probability: &[f64], luminance: &[f64], steps: &mut
     let (count, width) = (STEPS as f64, 1.0 / STEPS as f64);
     let (mut next, mut cumulative, mut moved) = (0_usize, 0.0, 0.0);
     let (mut mean, mut stepped_mean) = (0.0, 0.0);
+    // Room for the run of a cluster behind the last step.
     let mut row = [T::of(0); STEPS + RUN];
     let last = probability.len().saturating_sub(1);
     for (k, (&p, &y)) in probability.iter().zip(luminance).enumerate() {
