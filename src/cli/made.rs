@@ -28,15 +28,19 @@ pub fn write_seconds(timings: Option<&Path>, laps: Laps) -> Result<(), WorkshopE
 pub fn size_and_error(made: &Made) -> String {
     let lab = made.report.pointer("/accuracy/error/lab");
     let lab = lab.and_then(serde_json::Value::as_f64);
-    let error = lab.map_or(String::new(), |lab| format!(", error {lab:.3} Lab"));
+    let error = lab.map_or(String::new(), in_lab);
     format!("{} bytes{error}", made.bytes.len())
+}
+
+fn in_lab(error: f64) -> String {
+    format!(", error {error:.3} Lab")
 }
 
 /// How far off a result's flakes are, and where that is not known, why; nothing of a solid color.
 pub fn error(of: &ResultError) -> String {
     match (of.lab, of.unknown()) {
         _ if of.terms.is_empty() => String::new(),
-        (Some(lab), _) => format!(", error {lab:.3} Lab"),
+        (Some(lab), _) => in_lab(lab),
         (None, why) => format!(
             ", error not known{}",
             why.map_or(String::new(), |why| format!(": {why}"))
@@ -76,5 +80,31 @@ pub fn notes(picked: Option<&Picked>, notes: &[String]) {
     }
     for note in notes {
         eprintln!("note: {note}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accuracy::Term;
+
+    #[test]
+    fn an_error_is_told_in_lab_or_why_it_is_not_known_and_not_at_all_of_a_solid() {
+        let of = |terms: Vec<Option<f64>>| ResultError {
+            lab: terms.iter().copied().sum(),
+            terms: (terms.iter())
+                .map(|&lab| Term {
+                    what: "clusters",
+                    lab,
+                    how: "as it is known",
+                })
+                .collect(),
+            seen: None,
+            unseen: None,
+        };
+        assert_eq!(error(&of(Vec::new())), "");
+        assert_eq!(error(&of(vec![Some(0.25), Some(0.5)])), ", error 0.750 Lab");
+        let unknown = error(&of(vec![Some(0.25), None]));
+        assert_eq!(unknown, ", error not known: as it is known");
     }
 }

@@ -13,7 +13,10 @@ where
         text.parse()
             .ok()
             .filter(|number| range.contains(number))
-            .ok_or_else(|| format!("accepted is {} to {}", range.start(), range.end()))
+            .ok_or_else(|| {
+                let (start, end) = (range.start(), range.end());
+                format!("accepted is a whole number from {start} to {end}")
+            })
     }
 }
 
@@ -48,7 +51,10 @@ mod tests {
         let clusters = whole(1..=4096_u32);
         assert_eq!(clusters("4096"), Ok(4096));
         for text in ["0", "4097", "-3", "1.5", "nan", "", "1e99", "99999999999"] {
-            assert_eq!(clusters(text), Err("accepted is 1 to 4096".to_owned()));
+            assert_eq!(
+                clusters(text),
+                Err("accepted is a whole number from 1 to 4096".to_owned())
+            );
         }
         assert_eq!(real(1.0..=4.0)("1.5"), Ok(1.5));
         for text in ["0.9", "4.1", "nan", "inf", "", "glass"] {

@@ -50,7 +50,7 @@ pub enum FlakeFitError {
         source: NoTexel,
     },
     /// A setting out of range.
-    #[error("clusters is {0}, accepted is 1 to 4096")]
+    #[error("clusters is {0}, accepted is a whole number from 1 to 4096")]
     Clusters(usize),
     /// A recipe for simulated flakes out of range.
     #[error("the flake recipe's {field} is {value}, accepted is {low} to {high}")]
