@@ -10,7 +10,7 @@ use crate::store::Hash;
 use crate::workshop::companions_hash;
 
 /// Counts up when the same request would give other bytes: addresses and kept results of before are not met again.
-pub const MODEL: u32 = 13;
+pub const MODEL: u32 = 14;
 
 /// Hexadecimal digits after the prefix: 128 bits.
 const DIGITS: usize = 32;

@@ -11,7 +11,7 @@ use super::shelf::{unknown_blend, unknown_paint};
 use super::work::{Thing, colors};
 use crate::paint::{NotFinite, PaintFile};
 use crate::store::{
-    BlendRecord, BlobBytes, EnvironmentRecord, Hash, PaintRecord, StoreError, Visibility,
+    BlendRecord, BlobBytes, EnvironmentRecord, Hash, LocalBlob, PaintRecord, StoreError, Visibility,
 };
 
 /// What is kept of a paint, worked out.
@@ -126,6 +126,16 @@ impl App {
         };
         self.catalogue.add_blend(&record).await?;
         Ok(())
+    }
+
+    /// An upload that is kept, as a file.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] when it is gone, which its uploader or a record would have prevented.
+    pub async fn upload_at_hand(&self, upload: Hash) -> Result<LocalBlob, Problem> {
+        let local = self.blobs.local(upload).await?;
+        local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))
     }
 
     /// A blob that the record of a paint names, to be streamed.

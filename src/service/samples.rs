@@ -152,7 +152,7 @@ mod tests {
     }
 
     const GOLDEN: [&str; 9] = [
-        "model 13",
+        "model 14",
         "169 slices",
         "2002 clusters, 91.7 Lab",
         "grain 15.9",

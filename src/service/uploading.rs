@@ -1,4 +1,5 @@
-//! Uploads from their last byte until a record or a job names them: meanwhile nobody removes their blobs.
+//! Uploads from their last byte until a record or a job names them, or nothing ever will: meanwhile nobody removes their
+//! blobs.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -72,7 +73,7 @@ impl Uploaded {
     ///
     /// What came of it, or [`Problem`] when the store fails.
     pub async fn settle<T>(self, came: Result<T, Problem>) -> Result<T, Problem> {
-        self.end(came.is_err()).await?;
+        self.end(came.is_ok()).await?;
         came
     }
 
@@ -82,13 +83,13 @@ impl Uploaded {
     ///
     /// [`Problem`] when the store fails.
     pub async fn forget(self) -> Result<(), Problem> {
-        self.end(true).await
+        self.end(false).await
     }
 
-    async fn end(mut self, forget: bool) -> Result<(), Problem> {
+    async fn end(mut self, is_named: bool) -> Result<(), Problem> {
         self.settled = true;
         let spared = self.app.uploading.end(self.blob);
-        if spared || forget {
+        if spared || !is_named {
             self.app.forget_upload(self.blob).await?;
         }
         Ok(())
@@ -96,9 +97,19 @@ impl Uploaded {
 }
 
 impl Drop for Uploaded {
+    /// Of an upload whose caller left before anything came of it the blob goes, unless something names it.
     fn drop(&mut self) {
-        if !self.settled {
-            self.app.uploading.end(self.blob);
+        if self.settled {
+            return;
+        }
+        self.app.uploading.end(self.blob);
+        if let Ok(runtime) = tokio::runtime::Handle::try_current() {
+            let (app, blob) = (self.app.clone(), self.blob);
+            runtime.spawn(async move {
+                if let Err(problem) = app.forget_upload(blob).await {
+                    tracing::error!(%blob, ?problem, "an upload that came to nothing stays until the next start");
+                }
+            });
         }
     }
 }

@@ -90,6 +90,26 @@ async fn paints_on_differing_grids_are_blended_realised_drawn_and_uploaded_again
     timed(&again, &["preview", "total"]);
     let whole = house.get(&format!("{base}/bundle.zip")).await;
     timed(&whole, &["error", "encode", "bundle", "total"]);
+    let lab = blend["error"]["lab"].as_f64().expect("a known error");
+    let told = |answer: &Answer, name: &str| -> Option<f64> {
+        let header = answer.header("carpaint-accuracy")?;
+        let figure = header.split(", ").find_map(|f| f.strip_prefix(name))?;
+        figure.strip_prefix('=')?.parse().ok()
+    };
+    // What textures round comes on top.
+    let written = |error: Option<f64>| error.is_some_and(|e| e > lab - 1e-4 && e < lab + 0.5);
+    assert!(written(told(&whole, "flakes-lab")), "{lab} {whole:?}");
+    for format in ["zip", "json", "glb"] {
+        let address = format!("{base}/realisation.{format}?weights=0.5,0.5");
+        let first = house.get(&address).await;
+        assert!(written(told(&first, "flakes-lab")), "{lab} {first:?}");
+        let loss = told(&first, "gltf-median-de2000");
+        assert_eq!(loss.is_some_and(|loss| loss > 0.0), format == "glb");
+        let kept = house.get(&address).await;
+        let header = |answer: &Answer| answer.header("carpaint-accuracy").map(str::to_owned);
+        assert_eq!(header(&kept), header(&first));
+        assert_eq!(kept.body, first.body);
+    }
     let report = house.get(&format!("{base}/preview.json?{picture}")).await;
     let report = report.json();
     let effects = report["rendering"]["effects"].as_array();
@@ -371,6 +391,14 @@ async fn the_ingest_of_a_new_measurement_is_estimated_and_nothing_of_it_is_kept(
         kept["id"].as_str().expect("an id")
     );
     assert_eq!(house.get(&measurement).await.body, new);
+
+    // A .paint is taken as it is.
+    let paint = metallic("bmw339", 2);
+    let told = estimate("profile=draft", &paint).await.json();
+    let bytes = told["bytes"].as_u64().expect("a size") as usize;
+    assert!((paint.len()..paint.len() + 1000).contains(&bytes), "{told}");
+    let measured = estimate("coat_ior=1.5", &paint).await;
+    measured.problem(400, "invalid-parameter");
 
     let none = estimate("", b"no measurement").await;
     none.problem(422, "unusable-measurement");

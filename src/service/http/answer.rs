@@ -144,7 +144,7 @@ impl Answer {
         self
     }
 
-    /// With how accurate the content is. What is exact says nothing.
+    /// With how accurate the content is, where that is known.
     #[must_use]
     pub fn accuracy(self, accuracy: &str) -> Self {
         if accuracy.is_empty() {

@@ -20,7 +20,7 @@ use crate::service::work::{Asked, Works};
     responses(
         (status = 200, description = "The archive", headers(
             ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
-            ("Carpaint-Accuracy" = String, description = "Error of the flakes at weights within the paints, Lab, where it is known")),
+            ("Carpaint-Accuracy" = String, description = "`flakes-lab`: error of the flakes at weights within the paints, Lab, where it is known")),
             content((Vec<u8> = "application/zip"))),
         (status = 400, description = "A profile or a target that is none", body = ProblemDocument, content_type = "application/problem+json"),
         BlendProblems,

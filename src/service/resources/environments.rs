@@ -193,8 +193,7 @@ async fn named(
 
 /// Reads an upload as a panorama, from its file at a place to work at: who waits for one holds no bytes.
 async fn read(app: &App, file: Hash) -> Result<EnvironmentFile, Problem> {
-    let local = app.blobs.local(file).await?;
-    let local = local.ok_or_else(|| Problem::internal(format!("upload {file} is not there")))?;
+    let local = app.upload_at_hand(file).await?;
     let limits = app.config.limits;
     let read = move || {
         let bytes = std::fs::read(local.path()).map_err(Problem::internal)?;

@@ -22,7 +22,7 @@ use crate::service::http::{
 use crate::service::parameters::{of_field, targets};
 use crate::service::shelf::Shelved;
 use crate::service::work::{
-    Asked, Estimate, Format, IngestOrder, Layout, PictureFormat, Target, View, Works,
+    Asked, Estimate, Format, IngestOrder, Layout, Picked, PictureFormat, Target, View,
     WorkshopError, runner,
 };
 use crate::store::{Hash, LocalBlob};
@@ -119,8 +119,15 @@ pub async fn create(
     };
     let estimated = app.bench.run(move || {
         let environment = needed.environment().map_err(Problem::in_body)?;
-        let estimate =
-            |asked: &Asked<'_>| EstimateDocument::made(&*works, asked, &profile, &target);
+        let estimate = |asked: &Asked<'_>| {
+            if target.is_some() {
+                let picked = works.pick(asked, &target)?;
+                Ok(EstimateDocument::of_picked(&picked))
+            } else {
+                let estimate = works.estimate(asked, &profile)?;
+                Ok(EstimateDocument::of(&estimate, None))
+            }
+        };
         let done = needed.with_asked(environment.as_deref(), estimate);
         done.map_err(told)
     });
@@ -130,7 +137,8 @@ pub async fn create(
 /// Estimate the ingest of a new measurement.
 ///
 /// The body and the parameters are those of an upload to `/v1/paints`: the file itself. A few of its angles are fitted, here
-/// and now, and the rest is reckoned from them. Nothing is kept.
+/// and now, and the rest is reckoned from them. Nothing is kept. With `max_error` or `max_seconds` the answer says which
+/// profile would be picked.
 #[utoipa::path(
     post, operation_id = "estimate_upload", path = "/v1/estimates/ingest", tag = "accuracy", params(IngestQuery),
     request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "The measurement"),
@@ -146,52 +154,46 @@ pub async fn of_upload(
     query: Result<Query<IngestQuery>, Problem>,
     request: Request,
 ) -> Result<Answer, Problem> {
-    let ((order, target), (), received) = uploads::take_in(&app, query, Ok(()), request).await?;
-    let estimated = runner::to_its_end(async move {
-        let uploaded = app.uploaded(received).await?;
-        let estimated = look_at(&app, uploaded.blob(), order, target).await;
-        uploaded.forget().await?;
-        estimated
-    });
-    Ok(Answer::json(&estimated.await?, Keep::Never))
+    let asked = query.and_then(|Query(query)| query.order());
+    let ((order, target), received) = uploads::take_in(&app, asked, request).await?;
+    let on = app.clone();
+    let uploaded = runner::to_its_end(async move { on.uploaded(received).await }).await?;
+    let estimated = estimate_upload(&app, uploaded.blob(), order, target).await;
+    if let Err(problem) = uploaded.forget().await {
+        tracing::error!(
+            ?problem,
+            "a measurement that was estimated stays until the next start"
+        );
+    }
+    Ok(Answer::json(&estimated?, Keep::Never))
 }
 
-async fn look_at(
+async fn estimate_upload(
     app: &App,
     upload: Hash,
     order: IngestOrder,
     target: Target,
 ) -> Result<EstimateDocument, Problem> {
-    let local = app.blobs.local(upload).await?;
-    let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
-    let works = Arc::clone(&app.works);
+    if target.is_some() {
+        let picked = uploads::pick_for_upload(app, upload, &order, target).await?;
+        return Ok(EstimateDocument::of_picked(&picked));
+    }
+    let (local, works) = (app.upload_at_hand(upload).await?, Arc::clone(&app.works));
     let estimated = app.bench.run(move || {
         let asked = Asked::Ingest {
             upload: local.path(),
             order: &order,
         };
-        let folder = local.path().display().to_string();
-        EstimateDocument::made(&*works, &asked, &order.profile, &target)
-            .map_err(|error| Problem::of_upload(error.without(&folder)))
+        let file = local.path().display().to_string();
+        let estimate = works.estimate(&asked, &order.profile);
+        estimate.map_err(|error| Problem::of_upload(error.without(&file)))
     });
-    estimated.await?
+    Ok(EstimateDocument::of(&estimated.await??, None))
 }
 
 impl EstimateDocument {
-    /// The estimate of work with this profile, or with the one that is picked for a target.
-    fn made(
-        works: &dyn Works,
-        asked: &Asked<'_>,
-        profile: &Profile,
-        target: &Target,
-    ) -> Result<Self, WorkshopError> {
-        if target.is_some() {
-            let picked = works.pick(asked, target)?;
-            let found = Some((picked.met, picked.searched));
-            Ok(Self::of(&picked.estimate, found))
-        } else {
-            Ok(Self::of(&works.estimate(asked, profile)?, None))
-        }
+    fn of_picked(picked: &Picked) -> Self {
+        Self::of(&picked.estimate, Some((picked.met, picked.searched)))
     }
 
     fn of(estimate: &Estimate, picked: Option<(bool, f64)>) -> Self {
@@ -325,8 +327,7 @@ async fn again(app: &App, id: &str, profile: &Profile) -> Result<Needed, Problem
         )
     };
     let upload = paint.measurement.ok_or_else(none)?;
-    let local = app.blobs.local(upload).await?;
-    let gone = || Problem::internal(format!("upload {upload} is not there"));
+    let local = app.upload_at_hand(upload).await?;
     let layout = paint
         .file_of_paint()
         .and_then(|file| Layout::by_name(&file.provenance.source));
@@ -337,7 +338,7 @@ async fn again(app: &App, id: &str, profile: &Profile) -> Result<Needed, Problem
         profile: *profile,
         ..IngestOrder::default()
     };
-    Ok(Needed::Ingest(local.ok_or_else(gone)?, Box::new(order)))
+    Ok(Needed::Ingest(local, Box::new(order)))
 }
 
 fn missing(field: &str) -> Problem {

@@ -44,11 +44,14 @@ impl FileAnswer<'_> {
         let (on, told, counter) = (app.clone(), Arc::clone(&took), self.counter);
         let compute = move || async move {
             let works = Arc::clone(&on.works);
-            let made = on.bench.run(move || work(&*works)).await?;
-            let made = made.map_err(Problem::of_query)?;
+            let make = move || -> Result<_, WorkshopError> {
+                let made = work(&*works)?;
+                let _ = told.set(made.stages);
+                // What there is to report of a file is in it.
+                Ok(KeptFile::form(&made.accuracy, None, &made.bytes))
+            };
+            let kept = on.bench.run(make).await?.map_err(Problem::of_query)?;
             counter.increment(1);
-            let kept = KeptFile::form(&made);
-            let _ = told.set(made.stages);
             Ok(kept)
         };
         let kept = KeptFile::of(&app.results.get_or_compute(self.key, compute).await?)?;

@@ -25,7 +25,7 @@ use crate::service::work::{Asked, Format, Works};
     responses(
         (status = 200, description = "The file", headers(
             ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
-            ("Carpaint-Accuracy" = String, description = "Error of the flakes, Lab, where it is known; of a GLB what its material loses, CIEDE2000 in the median of the instrument geometries")), content(
+            ("Carpaint-Accuracy" = String, description = "`flakes-lab`: error of the flakes, Lab, where it is known; of a GLB also `gltf-median-de2000`: what its material loses, CIEDE2000 in the median of the instrument geometries")), content(
             (Vec<u8> = "application/zip"), (Vec<u8> = "model/gltf-binary"), (serde_json::Value = "application/json"),
             (Vec<u8> = "application/vnd.carpaint.paint"))),
         (status = 400, description = "Weights that do not fit the blend", body = ProblemDocument, content_type = "application/problem+json"),
@@ -49,7 +49,7 @@ pub async fn of_blend(
     responses(
         (status = 200, description = "The file", headers(
             ("Carpaint-Target" = String, description = "Of a target: whether it is met, with which profile, and what was estimated"),
-            ("Carpaint-Accuracy" = String, description = "Error of the flakes, Lab, where it is known; of a GLB what its material loses, CIEDE2000 in the median of the instrument geometries")), content(
+            ("Carpaint-Accuracy" = String, description = "`flakes-lab`: error of the flakes, Lab, where it is known; of a GLB also `gltf-median-de2000`: what its material loses, CIEDE2000 in the median of the instrument geometries")), content(
             (Vec<u8> = "application/zip"), (Vec<u8> = "model/gltf-binary"), (serde_json::Value = "application/json"),
             (Vec<u8> = "application/vnd.carpaint.paint"))),
         PaintProblems,

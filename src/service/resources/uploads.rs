@@ -61,7 +61,12 @@ pub struct IngestQuery {
 }
 
 impl IngestQuery {
-    fn order(self) -> Result<(IngestOrder, Target), Problem> {
+    /// What is asked, and the target in place of a profile.
+    ///
+    /// # Errors
+    ///
+    /// [`Problem`] that names the parameter.
+    pub fn order(self) -> Result<(IngestOrder, Target), Problem> {
         if let Some(name) = &self.name
             && (!NAME_CHARACTERS.contains(&name.chars().count())
                 || name.chars().any(char::is_control))
@@ -136,7 +141,8 @@ pub async fn upload(
     idempotency: Result<Idempotency, Problem>,
     request: Request,
 ) -> Result<Response, Problem> {
-    let (order, idempotency, received) = take_in(&app, query, idempotency, request).await?;
+    let asked = query.and_then(|Query(query)| Ok((query.order()?, idempotency?)));
+    let ((order, idempotency), received) = take_in(&app, asked, request).await?;
     let accepted = runner::to_its_end(accept(app.clone(), received, order, idempotency)).await?;
     let Accepted { id, job, picked } = accepted;
     let address = format!("/v1/paints/{id}");
@@ -144,29 +150,22 @@ pub async fn upload(
     making::answer(&app, prefer, job, &address, picked.as_ref(), made).await
 }
 
-/// Takes in a measurement that is not refused by its query, by what is said `beside` it, or by its headers.
+/// Takes in a measurement that is not refused by what was `asked` of it, or by its headers.
 ///
 /// # Errors
 ///
 /// [`Problem`] of those, or as [`receiving::receive`].
 pub async fn take_in<T>(
     app: &App,
-    query: Result<Query<IngestQuery>, Problem>,
-    beside: Result<T, Problem>,
+    asked: Result<T, Problem>,
     request: Request,
-) -> Result<((IngestOrder, Target), T, Box<dyn BlobWriter>), Problem> {
+) -> Result<(T, Box<dyn BlobWriter>), Problem> {
     let (parts, body) = request.into_parts();
-    let asked = query
-        .and_then(|Query(query)| query.order())
-        .and_then(|order| {
-            receiving::check_headers(app, &MEASUREMENT, &parts.headers)?;
-            Ok((order, beside?))
-        });
+    let asked = asked.and_then(|asked| {
+        receiving::check_headers(app, &MEASUREMENT, &parts.headers).map(|()| asked)
+    });
     match asked {
-        Ok((order, beside)) => {
-            let received = receiving::receive(app, body, &MEASUREMENT).await?;
-            Ok((order, beside, received))
-        }
+        Ok(asked) => Ok((asked, receiving::receive(app, body, &MEASUREMENT).await?)),
         Err(problem) => {
             receiving::drain(body.into_data_stream()).await;
             Err(problem)
@@ -220,14 +219,18 @@ async fn submitted(
     Ok(Accepted { id, job, picked })
 }
 
-async fn pick_for_upload(
+/// Picks a profile for an upload that is kept.
+///
+/// # Errors
+///
+/// [`Problem`] with the upload, or when too many wait to compute.
+pub async fn pick_for_upload(
     app: &App,
     upload: Hash,
     order: &IngestOrder,
     target: Target,
 ) -> Result<Picked, Problem> {
-    let local = app.blobs.local(upload).await?;
-    let local = local.ok_or_else(|| Problem::internal(format!("upload {upload} is not there")))?;
+    let local = app.upload_at_hand(upload).await?;
     let (works, order) = (Arc::clone(&app.works), order.clone());
     let whole = (upload, order.clone(), target);
     let pick = move || {
@@ -235,10 +238,10 @@ async fn pick_for_upload(
             upload: local.path(),
             order: &order,
         };
-        let folder = local.path().display().to_string();
+        let file = local.path().display().to_string();
         works
             .pick(&asked, &target)
-            .map_err(|error| Problem::of_upload(error.without(&folder)))
+            .map_err(|error| Problem::of_upload(error.without(&file)))
     };
     app.pick(&whole, pick).await
 }

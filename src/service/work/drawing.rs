@@ -81,7 +81,7 @@ pub async fn draw(
                     (&thing.thing, weights.as_ref(), environment.as_deref());
                 let drawn = works.preview(thing, weights, &view, light, format, &progress);
                 let drawn = drawn.map_err(Problem::of_query)?;
-                let kept = KeptFile::form(&drawn);
+                let kept = KeptFile::form(&drawn.accuracy, Some(&drawn.report), &drawn.bytes);
                 let _ = told.set(drawn.stages);
                 Ok(kept)
             });

@@ -1,8 +1,8 @@
 //! Files as the cache of results keeps them: with what is told about them, so that both are answered alike for ever.
 
 use bytes::Bytes;
+use serde_json::Value;
 
-use super::works::MadeFile;
 use crate::service::http::Problem;
 use crate::store::CachedResult;
 
@@ -11,18 +11,19 @@ use crate::store::CachedResult;
 pub struct KeptFile {
     /// How accurate it is, as the value of a header.
     pub accuracy: String,
-    /// The report on it, JSON.
+    /// The report on it, JSON, where it was kept.
     pub report: Bytes,
     /// The file.
     pub file: CachedResult,
 }
 
 impl KeptFile {
-    /// What is kept: a line of accuracy, a line of the report, the file.
+    /// What is kept of a file: a line of accuracy, a line of the report where that is to be answered too, the file.
     #[must_use]
-    pub fn form(made: &MadeFile) -> Bytes {
-        let head = format!("{}\n{}\n", made.accuracy, made.report);
-        [head.as_bytes(), &made.bytes].concat().into()
+    pub fn form(accuracy: &str, report: Option<&Value>, file: &[u8]) -> Bytes {
+        let report = report.map_or(String::new(), Value::to_string);
+        let head = format!("{accuracy}\n{report}\n");
+        [head.as_bytes(), file].concat().into()
     }
 
     /// What was kept.
@@ -47,5 +48,40 @@ impl KeptFile {
                 bytes: kept.bytes.slice(second + 1..),
             },
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::Hash;
+
+    fn kept(bytes: &[u8]) -> CachedResult {
+        CachedResult {
+            hash: Hash::of(bytes),
+            bytes: Bytes::copy_from_slice(bytes),
+        }
+    }
+
+    #[test]
+    fn what_was_kept_comes_back_whatever_bytes_are_in_it() {
+        let report = serde_json::json!({ "notes": ["two\nlines"] });
+        for file in [&b""[..], b"\n\n", b"a\nb\n"] {
+            for report in [None, Some(&report)] {
+                let form = KeptFile::form("flakes-lab=0.3", report, file);
+                let found = KeptFile::of(&kept(&form)).expect("two lines");
+                assert_eq!(found.accuracy, "flakes-lab=0.3");
+                assert_eq!(found.file.bytes, file);
+                let told = report.map_or(String::new(), Value::to_string);
+                assert_eq!(found.report, told.as_bytes());
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_two_lines_before_it_is_no_kept_file() {
+        for bytes in [&b""[..], b"PK", b"one line\nand a file"] {
+            assert!(KeptFile::of(&kept(bytes)).is_err());
+        }
     }
 }

@@ -108,7 +108,8 @@ pub enum Asked<'a> {
 pub struct MadeFile {
     /// The file.
     pub bytes: Vec<u8>,
-    /// How accurate it is, as the value of a header: the same for the same file. Empty for what is exact.
+    /// How accurate it is, as the value of a header: the same for the same file. Empty where nothing of it is
+    /// known.
     pub accuracy: String,
     /// What is in it, what was left out, what had to be clamped.
     pub report: Value,

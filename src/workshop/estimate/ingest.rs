@@ -1,5 +1,6 @@
 //! Estimates of an ingest, and samples of paints that are still to be ingested.
 
+use std::cell::RefCell;
 use std::path::Path;
 
 use super::machine::stand_in;
@@ -15,7 +16,9 @@ use crate::measurement::{FlakePictures, PackageBase};
 use crate::paint::{CarPaint, Clustering, PaintFile, Provenance, certify};
 use crate::workshop::ingest::finish;
 use crate::workshop::thing::{Source, Thing, find, open};
-use crate::workshop::{IngestOptions, Measurement, WorkshopError, open_measurement};
+use crate::workshop::{
+    IngestOptions, Laps, Measurement, WorkshopError, ingest_upload, is_paint_file, open_measurement,
+};
 
 /// A paint that may be still to be ingested, with a few of its angles.
 pub(super) struct Sampled {
@@ -35,6 +38,11 @@ pub(super) struct Sampled {
 ///
 /// [`WorkshopError`] for what cannot be opened, or is no measurement.
 pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, WorkshopError> {
+    if let Source::Path(path) = find(name)?
+        && is_paint_file(&path)?
+    {
+        return of_paint_file(&path, options);
+    }
     let sampled = sample(name, options, FEW_ANGLES)?;
     let whole = sampled.angles.map_or(1.0, |[h, d]| (h * d) as f64);
     let size = |paint: &PaintFile| -> Result<_, WorkshopError> {
@@ -49,6 +57,23 @@ pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, 
     let mut stages = sampled.stages;
     stages.extend(write_stage(bytes));
     let error = EstimatedError::lab(&paint_error(large));
+    Ok(Estimate::new(&options.profile, stages, bytes, error))
+}
+
+/// What a `.paint` will take that is uploaded: it is taken as it is, which is soon done in full.
+fn of_paint_file(path: &Path, options: &IngestOptions) -> Result<Estimate, WorkshopError> {
+    let laps = RefCell::new(Laps::begin());
+    let ended = |stage| laps.borrow_mut().end(stage);
+    let paint = ingest_upload(path, options, &|_| (), &ended)?;
+    let bytes = paint.to_bytes()?.len() as f64;
+    let mut stages: Vec<Stage> = (laps.into_inner().into_stages().into_iter())
+        .map(|(stage, time)| Stage {
+            stage,
+            seconds: time.as_secs_f64(),
+        })
+        .collect();
+    stages.extend(write_stage(bytes));
+    let error = EstimatedError::lab(&paint_error(&paint));
     Ok(Estimate::new(&options.profile, stages, bytes, error))
 }
 
