@@ -47,11 +47,12 @@ impl Textures {
                 );
                 continue;
             }
-            let mut planes: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; texels]);
-            let [l, a, b] = &mut planes;
-            for (((l, a), b), corner) in l.iter_mut().zip(a).zip(b).zip(corners) {
-                [*l, *a, *b] = *corner;
-            }
+            let planes = std::array::from_fn(|k| {
+                let mut plane = Vec::with_capacity(texels);
+                plane.extend(corners.iter().map(|c| c[k]));
+                plane.resize(texels, 0.0);
+                plane
+            });
             let written = self.three_planes(name, width, planes, precision)?;
             self.corner_rounding_lab = self.corner_rounding_lab.max(written.rounding);
             let (bytes, kind) = written.file;

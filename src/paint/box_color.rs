@@ -23,6 +23,7 @@ pub fn mean_color(lower: [f32; 3], upper: [f32; 3]) -> LinearRgb {
 }
 
 /// The same mean in XYZ, white of Y = 1: what is summed over many boxes need be taken to sRGB only once.
+#[inline]
 #[must_use]
 pub(super) fn mean_xyz(lower: [f32; 3], upper: [f32; 3]) -> [f64; 3] {
     let lo = lower.map(f64::from);
