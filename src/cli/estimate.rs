@@ -35,6 +35,8 @@ enum What {
         #[arg(value_name = "INPUT")]
         input: String,
         #[command(flatten)]
+        reading: ReadingArgs,
+        #[command(flatten)]
         target: TargetArgs,
     },
     /// Of `carpaint blend`, opening and ingesting included.
@@ -144,7 +146,11 @@ impl Estimate {
             | What::Bundle { target, .. }
             | What::Preview { target, .. } => target,
         };
-        let options = ReadingArgs::default().options(None, &target.profile)?;
+        let reading = match &self.work {
+            What::Ingest { reading, .. } => reading.clone(),
+            _ => ReadingArgs::default(),
+        };
+        let options = reading.options(None, &target.profile)?;
         let estimate = self.estimate(target, &options)?.after(vec![starting()]);
         if as_json {
             let mut told = serde_json::to_value(&estimate).map_err(WorkshopError::internal)?;
