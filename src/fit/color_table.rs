@@ -23,6 +23,9 @@ use crate::color::{Lab, LinearRgb, ciede2000, luminance};
 use crate::measurement::{MeasuredBrdf, half_frame_pair};
 use crate::paint::{AngleGrid, ColorTable, Direction, half_angles, instrument_pairs, refract};
 
+/// Most angles of half and difference angle that a fitted color table has.
+pub const FITTED_ANGLES: [usize; 2] = [THETA_H.len(), THETA_D.len()];
+
 const THETA_H: [f64; 31] = [
     0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.5, 9.0, 10.5, 12.5, 15.0, 17.5, 20.0, 22.5,
     26.0, 30.0, 34.0, 37.5, 42.0, 46.0, 50.0, 55.0, 60.0, 65.0, 70.0, 80.0, 90.0,

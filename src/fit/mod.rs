@@ -35,6 +35,7 @@ mod thinned;
 pub use base::{CoatChoice, FitError, FittedBase, fit_base, fit_base_telling};
 pub use boxes::BoxRule;
 pub use clusters::{ClusterSettings, Clusterer, NoTexel, SliceClusters};
+pub use color_table::FITTED_ANGLES;
 pub use flake_patch::SimulatedPatch;
 pub use flakes::{FittedFlakes, FlakeFitError, Progress, fit_flakes};
 pub use from_readings::{PaintFromReadings, ReadingsFitError, paint_from_readings};

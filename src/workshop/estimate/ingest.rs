@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::path::Path;
 
-use super::machine::stand_in;
+use super::machine::{fitted_stand_in, stand_in};
 use super::{
     COLD, Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, left_at, steady,
     step_for, this_machine, timed, wanted_on, write_stage,
@@ -17,7 +17,8 @@ use crate::paint::{CarPaint, Clustering, PaintFile, Provenance, certify};
 use crate::workshop::ingest::finish;
 use crate::workshop::thing::{Source, Thing, find, open};
 use crate::workshop::{
-    IngestOptions, Laps, Measurement, WorkshopError, ingest_upload, is_paint_file, open_measurement,
+    IngestOptions, Lap, Laps, Measurement, WorkshopError, ingest_in_stages, ingest_upload,
+    is_paint_file, open_measurement,
 };
 
 /// A paint that may be still to be ingested, with a few of its angles.
@@ -62,19 +63,25 @@ pub fn estimate_ingest(name: &str, options: &IngestOptions) -> Result<Estimate, 
 
 /// What a `.paint` will take that is uploaded: it is taken as it is, which is soon done in full.
 fn of_paint_file(path: &Path, options: &IngestOptions) -> Result<Estimate, WorkshopError> {
-    let laps = RefCell::new(Laps::begin());
-    let ended = |stage| laps.borrow_mut().end(stage);
-    let paint = ingest_upload(path, options, &|_| (), &ended)?;
+    let (paint, mut stages) = in_full(|ended| ingest_upload(path, options, &|_| (), ended))?;
     let bytes = paint.to_bytes()?.len() as f64;
-    let mut stages: Vec<Stage> = (laps.into_inner().into_stages().into_iter())
-        .map(|(stage, time)| Stage {
-            stage,
-            seconds: time.as_secs_f64(),
-        })
-        .collect();
     stages.extend(write_stage(bytes));
     let error = EstimatedError::lab(&paint_error(&paint));
     Ok(Estimate::new(&options.profile, stages, bytes, error))
+}
+
+/// Does what is soon done, and says what each stage took.
+fn in_full(
+    work: impl FnOnce(&dyn Fn(&'static str)) -> Result<PaintFile, WorkshopError>,
+) -> Result<(PaintFile, Vec<Stage>), WorkshopError> {
+    let laps = RefCell::new(Laps::begin());
+    let paint = work(&|stage| laps.borrow_mut().end(stage))?;
+    let stages = laps.into_inner().into_stages().into_iter();
+    let stage = |(stage, time): Lap| Stage {
+        stage,
+        seconds: time.as_secs_f64(),
+    };
+    Ok((paint, stages.map(stage).collect()))
 }
 
 /// What a name means, to estimate work on it: files that are paints or blends as they are, of measurements and samples a
@@ -234,12 +241,18 @@ fn of_measurement(
             package
         }
         Measurement::Brdf(..) => {
-            stages.push(fit_stage());
-            return Ok(Sampled::solid(finished(name, stand_in(), None), stages));
+            stages.push(base_stage(options.coat_ior.is_some()));
+            let (seconds, paint) = timed(|| finished(name, fitted_stand_in(), None));
+            stages.push(Stage {
+                stage: "certificate",
+                seconds,
+            });
+            return Ok(Sampled::solid(paint, stages));
         }
         // A few readings are fitted at once.
         Measurement::Readings(..) => {
-            return Ok(Sampled::solid(finished(name, stand_in(), None), stages));
+            let (paint, stages) = in_full(|ended| ingest_in_stages(path, options, &|_| (), ended))?;
+            return Ok(Sampled::solid(paint, stages));
         }
     };
     let mut paint = stand_in();
@@ -254,7 +267,10 @@ fn of_measurement(
             paint.lobes.clone_from(lobes);
             paint.color_table = color_table.clone();
         }
-        Some(PackageBase::Table { .. }) => stages.push(fit_stage()),
+        Some(PackageBase::Table { .. }) => {
+            stages.push(base_stage(true));
+            paint.color_table = fitted_stand_in().color_table;
+        }
         None => {}
     }
     let Some(pictures) = &package.flakes else {
@@ -355,9 +371,9 @@ fn hash_stage(path: &Path) -> Stage {
 }
 
 /// What fitting a reflectance table takes.
-fn fit_stage() -> Stage {
+fn base_stage(coat_is_known: bool) -> Stage {
     Stage {
-        stage: "fit",
-        seconds: this_machine().fit_seconds(),
+        stage: "base",
+        seconds: this_machine().fit_seconds(coat_is_known),
     }
 }

@@ -8,7 +8,8 @@ use std::sync::OnceLock;
 
 use super::{extrapolated, timed};
 use crate::accuracy::study::Machine;
-use crate::paint::{CarPaint, Chi, ColorTable, Lobe, Reflectance, instrument_pairs};
+use crate::fit::FITTED_ANGLES;
+use crate::paint::{AngleGrid, CarPaint, Chi, ColorTable, Lobe, Reflectance, instrument_pairs};
 
 static HERE: OnceLock<Machine> = OnceLock::new();
 
@@ -129,6 +130,21 @@ pub(super) fn stand_in() -> CarPaint {
         ],
         color_table: ColorTable::white(),
         flakes: None,
+    }
+}
+
+/// The same with a color table of the size that a fit has.
+pub(super) fn fitted_stand_in() -> CarPaint {
+    let [theta_h, theta_d] = FITTED_ANGLES.map(|count| {
+        let angles = (0..count).map(|k| 90.0 * k as f64 / count as f64);
+        AngleGrid::new(angles.collect()).unwrap_or_else(|_| AngleGrid::single())
+    });
+    let white = ColorTable::white();
+    let nodes = vec![white.nodes()[0]; theta_h.len() * theta_d.len()];
+    let overall = white.overall();
+    CarPaint {
+        color_table: ColorTable::new(theta_h, theta_d, nodes, overall).unwrap_or(white),
+        ..stand_in()
     }
 }
 

@@ -8,7 +8,8 @@ use crate::workshop::previewing::{PictureFormat, PreviewOptions, picture_error, 
 use crate::workshop::realising::Made;
 use crate::workshop::{Lap, Thing, WorkshopError};
 
-/// Pixels on the longer side of the samples; the third is drawn where the second took hardly longer than the first.
+/// Pixels on a side of the samples, were they squares; the third is drawn where the second took hardly longer than the first,
+/// and where it is a small part of the picture: pixels of small pictures take longer, for each sees more of the paint.
 const SIDES: [u32; 3] = [20, 56, 160];
 
 /// The same for who looks through profiles.
@@ -19,6 +20,9 @@ const SIDES_OF_ANGLES: [u32; 2] = [160, 320];
 
 /// How much longer a larger sample has to take, to tell drawing from getting ready.
 const LONGER: f64 = 3.0;
+
+/// Part of the picture's work that is small.
+const SMALL_PART: f64 = 1.0 / 24.0;
 
 /// Part of a larger sample's time that is at least proportional to the work.
 const LEAST_SHARE: f64 = 0.25;
@@ -81,7 +85,7 @@ impl SmallPictures {
         samples_per_pixel: u32,
     ) -> Result<Self, WorkshopError> {
         let sides = &SEARCHING_SIDES;
-        Self::draw(work, samples_per_pixel, sides, |of| {
+        Self::draw(work, samples_per_pixel, sides, 0.0, |of| {
             timed(|| work.draw(&of))
         })
     }
@@ -132,23 +136,28 @@ impl SmallPictures {
             .collect()
     }
 
-    /// Draws them at these numbers of pixels on the longer side; `time` says how often, and which go counts.
+    /// Draws them of as many pixels as squares of these sides, in the shape of the picture; `time` says how often, and which
+    /// go counts, and `whole` is the work of the picture. By its longer side a strip would be of so few pixels that getting ready is all that they tell.
     fn draw(
         work: &PictureWork<'_>,
         samples_per_pixel: u32,
         sides: &[u32],
+        whole: f64,
         time: impl Fn(PreviewOptions) -> (f64, Result<Made, WorkshopError>),
     ) -> Result<Self, WorkshopError> {
         let options = work.options;
-        let longer = f64::from(options.size[0].max(options.size[1]));
+        let [across, down] = options.size.map(f64::from);
+        let as_square = (across * down).sqrt();
         let mut drawn: Vec<SmallPicture> = Vec::new();
         for &side in sides {
+            let part = f64::from(side * side) * batches(samples_per_pixel) / whole;
             if let [first, .., last] = &drawn[..]
                 && last.seconds > LONGER * first.seconds
+                && part > SMALL_PART
             {
                 break;
             }
-            let scale = (f64::from(side) / longer).min(1.0);
+            let scale = (f64::from(side) / as_square).min(1.0);
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pixels
             let size = (options.size).map(|n| ((f64::from(n) * scale).round() as u32).max(1));
             let pixels = f64::from(size[0]) * f64::from(size[1]);
@@ -261,12 +270,15 @@ pub fn estimate_preview(
     let few = samples.min(2 * ENOUGH);
     let itself = work.with(samples);
     let [across, down] = itself.size.map(f64::from);
-    let small = if across * down * batches(samples) <= LITTLE {
+    let whole = across * down * batches(samples);
+    let small = if whole <= LITTLE {
         SmallPictures::of(&itself, timed(|| work.draw(&itself)))?
     } else if work.options.show.is_paint() {
-        SmallPictures::draw(work, few, &SIDES, |of| shortest(|| work.draw(&of)))?
+        SmallPictures::draw(work, few, &SIDES, whole, |of| shortest(|| work.draw(&of)))?
     } else {
-        SmallPictures::draw(work, 1, &SIDES_OF_ANGLES, |of| timed(|| work.draw(&of)))?
+        SmallPictures::draw(work, 1, &SIDES_OF_ANGLES, whole, |of| {
+            timed(|| work.draw(&of))
+        })?
     };
     let error = work.error_of(samples)?;
     Ok(small.estimate(work, profile, &error))
@@ -289,7 +301,12 @@ mod tests {
         let sample = sample_by_name("white").expect("a sample");
         let paint = sample.build(&Profile::draft(), &|_| ()).expect("builds");
         let (thing, limits) = (Thing::Paint(Box::new(paint)), Limits::default());
-        for (size, samples_per_pixel) in [([8, 8], 4096), ([64, 64], 64), ([512, 384], 64)] {
+        for (size, samples_per_pixel) in [
+            ([8, 8], 4096),
+            ([64, 64], 64),
+            ([512, 384], 64),
+            ([4096, 64], 64),
+        ] {
             let options = PreviewOptions {
                 show: Show::Paint,
                 scene: Shape::Sphere,
@@ -314,7 +331,8 @@ mod tests {
                 };
                 (seconds(of), work.draw(&one))
             };
-            let small = SmallPictures::draw(&work, few, &SIDES, |of| made(&of)).expect("drawn");
+            let small =
+                SmallPictures::draw(&work, few, &SIDES, 0.0, |of| made(&of)).expect("drawn");
             let told = small.tell(size, samples_per_pixel).0;
             let wanted = seconds(&options);
             assert!(

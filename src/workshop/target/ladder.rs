@@ -32,6 +32,8 @@ pub(super) fn ladder(work: &Work<'_>) -> Vec<Profile> {
             (200, 1),
             (400, 1),
             (1000, 1),
+            (1500, 1),
+            (2500, 1),
             (4096, 1),
         ]
         .into_iter()

@@ -217,6 +217,7 @@ impl EstimateOrder {
     /// [`Problem`] as a picture's.
     pub async fn view(&self, app: &App, profile: &Profile) -> Result<View, Problem> {
         let show = self.show.unwrap_or_default();
+        let for_target = (self.max_error.is_some() || self.max_seconds.is_some()).then_some(1);
         let sampled = [
             ("profile", self.profile.is_some()),
             ("max_error", self.max_error.is_some()),
@@ -228,7 +229,8 @@ impl EstimateOrder {
             show,
             scene: self.scene.unwrap_or_default(),
             size: self.size.unwrap_or([512; 2]),
-            samples_per_pixel: view::samples(show, None, profile),
+            // How many samples meet a target is found once everything else is known to be right.
+            samples_per_pixel: view::samples(show, for_target, profile),
             environment: environment.await?,
             lights: self.lights.clone(),
         };
