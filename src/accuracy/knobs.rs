@@ -313,6 +313,10 @@ mod tests {
         for (text, named) in [
             ("cluster=3", "`clusters`"),
             (
+                "clusters=10,draft,clusters=20",
+                "clusters is set twice, to 10 and to 20, accepted is one of the two",
+            ),
+            (
                 "clusters=many",
                 "clusters is \"many\", accepted is a whole number from 1 to 4096",
             ),

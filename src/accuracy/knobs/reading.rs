@@ -93,8 +93,10 @@ impl FromStr for Knobs {
                 Ok(number) if number.is_finite() => Value::from(number),
                 _ => Value::from(value),
             };
-            if object.insert(name.to_owned(), read).is_some() {
-                return Err(ProfileError::Knob(format!("{name} is set twice")));
+            if let Some(before) = object.insert(name.to_owned(), read.clone()) {
+                return Err(ProfileError::Knob(format!(
+                    "{name} is set twice, to {before} and to {read}, accepted is one of the two"
+                )));
             }
         }
         Self::of_object(object)
