@@ -1,4 +1,5 @@
-//! One file per resource: what can be asked of it, and what is answered.
+//! One file per resource: what can be asked of it, and what is answered. `making` and `files` are how several answer: with
+//! what a job makes, and with a file.
 //!
 //! Promised: a handler reads its request, has the work done and answers; `docs` documents every one of them. Left to
 //! others: how requests are read and answers written (`http`), where they compute and how jobs run (`work`).

@@ -2,7 +2,8 @@
 //!
 //! `works` says what can be asked, `workshop` has it done by the use cases that the command line calls too, and the
 //! `workbench` keeps it off the threads that talk to the network. What takes longer is a job of the `runner`:
-//! `ingesting` and `blending`; `drawing` pictures is quick enough to be waited for.
+//! `ingesting` and `blending`; `drawing` pictures is quick enough to be waited for. What is made is kept as a `kept_file`, with
+//! what is told about it.
 //!
 //! Promised: a job that was acknowledged is done once, also after a kill; what nobody waits for any more is called off.
 //! Left to others: what requests look like (`resources`), how paints are made (`crate::workshop`).
