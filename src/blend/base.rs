@@ -102,6 +102,12 @@ pub(super) fn diffuse(paints: &[BlendedPaint], weights: &[f64], ledger: &mut Led
     })
 }
 
+fn add(sum: &mut Lab, weight: f64, lab: Lab) {
+    sum.l += weight * lab.l;
+    sum.a += weight * lab.a;
+    sum.b += weight * lab.b;
+}
+
 /// Color tables blend in CIELAB, node by node (Golla and Klein 2018, 4.2).
 pub(super) fn color_table(
     paints: &[BlendedPaint],
@@ -109,29 +115,31 @@ pub(super) fn color_table(
     ledger: &mut Ledger,
 ) -> ColorTable {
     let first = &paints[0].color_table;
+    let mut nodes = vec![Lab::default(); first.nodes().len()];
+    let mut overall = Lab::default();
+    for (paint, &w) in paints.iter().zip(weights) {
+        for (sum, &lab) in nodes.iter_mut().zip(paint.color_table.nodes()) {
+            add(sum, w, lab);
+        }
+        add(&mut overall, w, paint.color_table.overall());
+    }
+    let mut farthest = [0.0_f64; 3];
+    for node in nodes.iter().chain([&overall]) {
+        for (farthest, value) in farthest.iter_mut().zip(node.to_array()) {
+            *farthest = farthest.max(value.abs());
+        }
+    }
     let (mut held, mut worst) = (0, 0.0_f64);
-    let mut mix = |get: &dyn Fn(&ColorTable) -> Lab| {
-        let mut sum = [0.0; 3];
-        for (paint, w) in paints.iter().zip(weights) {
-            let lab = get(&paint.color_table).to_array();
-            for axis in 0..3 {
-                sum[axis] += w * lab[axis];
-            }
-        }
-        for value in &mut sum {
-            let beyond = value.abs() - MAX_LAB;
-            if beyond > 0.0 {
-                held += 1;
+    if farthest.iter().any(|value| *value > MAX_LAB) {
+        for node in nodes.iter_mut().chain([&mut overall]) {
+            *node = Lab::from(node.to_array().map(|value| {
+                let beyond = value.abs() - MAX_LAB;
+                held += usize::from(beyond > 0.0);
                 worst = worst.max(beyond);
-                *value = value.clamp(-MAX_LAB, MAX_LAB);
-            }
+                value.clamp(-MAX_LAB, MAX_LAB)
+            }));
         }
-        Lab::from(sum)
-    };
-    let nodes: Vec<Lab> = (0..first.nodes().len())
-        .map(|k| mix(&|t| t.nodes()[k]))
-        .collect();
-    let overall = mix(&|t| t.overall());
+    }
     ledger.record(
         "color_table",
         "Lab held to -2000..2000",

@@ -15,7 +15,7 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
-use self::sums::{BLOCK, Turned, Weight, append_sums, sums};
+use self::sums::{PATTERN, Turned, Weight, append_sums, sums};
 use super::clamp::Ledger;
 use super::{BlendedFlakes, Boxes};
 use crate::paint::{MAX_LAB, largest_magnitude};
@@ -130,13 +130,14 @@ fn narrow<const PAINTS: usize>(
     if weights.iter().all(|w| *w == [w[0]; 3]) {
         return blocks(paints, &weights.map(|w| w[0]), leaves || turns, out);
     }
-    let patterns: [[f32; BLOCK]; PAINTS] = weights.map(|axes| std::array::from_fn(|k| axes[k % 3]));
+    let patterns: [[f32; PATTERN]; PAINTS] =
+        weights.map(|axes| std::array::from_fn(|k| axes[k % 3]));
     blocks(paints, &patterns, leaves || turns, out)
 }
 
-fn blocks<const PAINTS: usize>(
+fn blocks<W: Weight, const PAINTS: usize>(
     paints: [&Boxes; PAINTS],
-    weights: &[impl Weight; PAINTS],
+    weights: &[W; PAINTS],
     watch: bool,
     out: &mut Boxes,
 ) -> Account {
@@ -151,8 +152,8 @@ fn blocks<const PAINTS: usize>(
             list.reserve_exact(numbers);
         }
     }
-    for first in (0..numbers).step_by(BLOCK) {
-        let here = first..(first + BLOCK).min(numbers);
+    for first in (0..numbers).step_by(W::BLOCK) {
+        let here = first..(first + W::BLOCK).min(numbers);
         let [lower, upper] = [
             paints.map(|own| &own.lower.as_flattened()[here.clone()]),
             paints.map(|own| &own.upper.as_flattened()[here.clone()]),

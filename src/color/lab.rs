@@ -61,11 +61,13 @@ pub(crate) fn compress(t: f64) -> f64 {
 
 /// Inverse of the CIELAB compression: relative light of one channel from its `f` value.
 pub(crate) fn expand(f: f64) -> f64 {
-    if f > KNEE {
-        f * f * f
-    } else {
-        3.0 * KNEE * KNEE * (f - 4.0 / 29.0)
-    }
+    if f > KNEE { f * f * f } else { expand_dark(f) }
+}
+
+/// [`expand`] up to the knee.
+#[inline]
+pub(crate) fn expand_dark(f: f64) -> f64 {
+    3.0 * KNEE * KNEE * (f - 4.0 / 29.0)
 }
 
 /// [`expand`] at texel precision.

@@ -18,7 +18,7 @@ mod white;
 pub use adaptation::adapted;
 pub use difference::ciede2000;
 pub use lab::Lab;
-pub(crate) use lab::{KNEE, compress, expand, expand_f32};
+pub(crate) use lab::{KNEE, compress, expand, expand_dark, expand_f32};
 pub use rgb::{LinearRgb, luminance, rgb_to_xyz, xyz_to_rgb};
 pub use spectrum::{SpectrumError, Wavelengths};
 pub use transfer::{decode_srgb, encode_srgb, encode_srgb_f32};

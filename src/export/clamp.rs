@@ -77,29 +77,46 @@ pub(super) fn halves(
     if finite(what, values)? > HALF_MAX {
         hold(what, values, clamped);
     }
-    let mut list = vec![f16::ZERO; values.len()];
-    let (mut rounding, mut back) = (0.0_f32, [0.0; BLOCK]);
-    for (values, list) in values.chunks(BLOCK).zip(list.chunks_mut(BLOCK)) {
-        list.convert_from_f32_slice(values);
-        // Counted, not searched for: a search that may stop would go number by number.
-        let small = values
-            .iter()
-            .filter(|value| value.abs() < HALF_MIN && **value != 0.0);
-        if small.count() > 0 {
-            for (half, value) in list.iter_mut().zip(values) {
-                if value.abs() < HALF_MIN {
-                    *half = f16::from_f32(without_subnormals(*value));
+    Ok(pulp::Arch::new().dispatch(Conversion { values }))
+}
+
+/// The conversion of numbers within the range, compiled for wide registers too.
+struct Conversion<'a> {
+    values: &'a [f32],
+}
+
+impl pulp::NullaryFnOnce for Conversion<'_> {
+    type Output = Halves;
+
+    #[inline(always)]
+    fn call(self) -> Halves {
+        let mut list = Vec::with_capacity(self.values.len());
+        let (mut rounding, mut halves, mut back) = (0.0_f32, [f16::ZERO; BLOCK], [0.0; BLOCK]);
+        for values in self.values.chunks(BLOCK) {
+            let halves = &mut halves[..values.len()];
+            halves.convert_from_f32_slice(values);
+            // Counted, not searched for: a search that may stop would go number by number.
+            let mut small = 0_u32;
+            for value in values {
+                small += u32::from(value.abs() < HALF_MIN) - u32::from(*value == 0.0);
+            }
+            if small > 0 {
+                for (half, value) in halves.iter_mut().zip(values) {
+                    if value.abs() < HALF_MIN {
+                        *half = f16::from_f32(without_subnormals(*value));
+                    }
                 }
             }
+            list.extend_from_slice(halves);
+            let back = &mut back[..values.len()];
+            halves.convert_to_f32_slice(back);
+            for (back, value) in back.iter_mut().zip(values) {
+                *back -= value;
+            }
+            rounding = rounding.max(largest_magnitude(back));
         }
-        let back = &mut back[..values.len()];
-        list.convert_to_f32_slice(back);
-        for (back, value) in back.iter_mut().zip(values) {
-            *back -= value;
-        }
-        rounding = rounding.max(largest_magnitude(back));
+        Halves { list, rounding }
     }
-    Ok(Halves { list, rounding })
 }
 
 /// Holds numbers to ±65504 and keeps the account.

@@ -11,7 +11,7 @@
 //! `m³ + 3m·var`, wholly below it is linear: both exact, and what nearly every box takes. Only a box across the knee
 //! needs the integrals, and where it is also thin the differences cancel: there 4-point Gauss is used.
 
-use crate::color::{D65_2, KNEE, LinearRgb, compress, expand, rgb_to_xyz, xyz_to_rgb};
+use crate::color::{D65_2, KNEE, LinearRgb, compress, expand, expand_dark, rgb_to_xyz, xyz_to_rgb};
 
 /// Half width below which differences of P2 lose more than Gauss quadrature does.
 const THIN: f64 = 2e-3;
@@ -22,25 +22,104 @@ pub fn mean_color(lower: [f32; 3], upper: [f32; 3]) -> LinearRgb {
     xyz_to_rgb(mean_xyz(lower, upper))
 }
 
-/// The same mean in XYZ, white of Y = 1: what is summed over many boxes need be taken to sRGB only once.
-#[inline]
-#[must_use]
-pub(super) fn mean_xyz(lower: [f32; 3], upper: [f32; 3]) -> [f64; 3] {
-    let lo = lower.map(f64::from);
-    let hi = upper.map(f64::from);
-    // Lab of magnitudes below 2^1023: the plain sum is the midpoint.
-    let (center, half): ([f64; 3], [f64; 3]) = (
-        std::array::from_fn(|k| (lo[k] + hi[k]) * 0.5),
-        std::array::from_fn(|k| (hi[k] - lo[k]).abs() * 0.5),
-    );
-    let (y, dy) = ((center[0] + 16.0) * (1.0 / 116.0), half[0] * (1.0 / 116.0));
-    let (u, du) = (center[1] * (1.0 / 500.0), half[1] * (1.0 / 500.0));
-    let (v, dv) = (center[2] * (1.0 / 200.0), half[2] * (1.0 / 200.0));
+/// [`mean_color`] in XYZ, white of Y = 1, of box after box to `each`: what is summed over many boxes need be taken to
+/// sRGB only once.
+pub(super) fn mean_xyz_of_each(lower: &[[f32; 3]], upper: &[[f32; 3]], each: impl FnMut([f64; 3])) {
+    pulp::Arch::new().dispatch(Means { lower, upper, each });
+}
+
+fn mean_xyz(lower: [f32; 3], upper: [f32; 3]) -> [f64; 3] {
+    let [x, y, z] = side_by_side(&[lower], &[upper]);
+    [x[0], y[0], z[0]]
+}
+
+/// Boxes whose means are taken side by side.
+const LANES: usize = 8;
+
+/// The means of boxes, compiled for wide registers too.
+struct Means<'a, F> {
+    lower: &'a [[f32; 3]],
+    upper: &'a [[f32; 3]],
+    each: F,
+}
+
+impl<F: FnMut([f64; 3])> pulp::NullaryFnOnce for Means<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(mut self) {
+        let (lower, lower_rest) = self.lower.as_chunks::<LANES>();
+        let (upper, upper_rest) = self.upper.as_chunks::<LANES>();
+        for (lower, upper) in lower.iter().zip(upper) {
+            let [x, y, z] = side_by_side(lower, upper);
+            for k in 0..LANES {
+                (self.each)([x[k], y[k], z[k]]);
+            }
+        }
+        for (&lower, &upper) in lower_rest.iter().zip(upper_rest) {
+            (self.each)(mean_xyz(lower, upper));
+        }
+    }
+}
+
+/// Mean X, Y and Z of boxes.
+#[inline(always)]
+fn side_by_side<const N: usize>(lower: &[[f32; 3]; N], upper: &[[f32; 3]; N]) -> [[f64; N]; 3] {
+    let [mut middle, mut reach] = [[[0.0; N]; 3]; 2];
+    for k in 0..N {
+        for axis in 0..3 {
+            let (low, high) = (f64::from(lower[k][axis]), f64::from(upper[k][axis]));
+            // Lab of magnitudes below 2^1023: the plain sum is the midpoint.
+            middle[axis][k] = (low + high) * 0.5;
+            reach[axis][k] = (high - low).abs() * 0.5;
+        }
+    }
+    for k in 0..N {
+        middle[0][k] = (middle[0][k] + 16.0) * (1.0 / 116.0);
+        reach[0][k] *= 1.0 / 116.0;
+        middle[1][k] *= 1.0 / 500.0;
+        reach[1][k] *= 1.0 / 500.0;
+        middle[2][k] *= 1.0 / 200.0;
+        reach[2][k] *= 1.0 / 200.0;
+    }
+    let [y, mut x, mut z] = middle;
+    for k in 0..N {
+        x[k] += y[k];
+        z[k] = y[k] - z[k];
+    }
+    let [dy, du, dv] = reach;
     [
-        D65_2.x * mean_of_sum(y + u, dy, du),
-        D65_2.y * mean_of_sum(y, dy, 0.0),
-        D65_2.z * mean_of_sum(y - v, dy, dv),
+        means_of_sums(D65_2.x, &x, &dy, &du),
+        means_of_sums(D65_2.y, &y, &dy, &[0.0; N]),
+        means_of_sums(D65_2.z, &z, &dy, &dv),
     ]
+}
+
+/// `white` times [`mean_of_sum`], which decides box by box what is decided here of all boxes at once.
+#[inline(always)]
+fn means_of_sums<const N: usize>(
+    white: f64,
+    m: &[f64; N],
+    ds: &[f64; N],
+    dt: &[f64; N],
+) -> [f64; N] {
+    let mut means = [0.0; N];
+    for k in 0..N {
+        let bright = bright_mean_of_sum(m[k], ds[k], dt[k]);
+        let is_bright = m[k] - (ds[k] + dt[k]) >= KNEE;
+        means[k] = white * if is_bright { bright } else { expand_dark(m[k]) };
+    }
+    let mut across = 0_u64;
+    for k in 0..N {
+        let reach = ds[k] + dt[k];
+        across += u64::from(!(m[k] - reach >= KNEE || m[k] + reach <= KNEE));
+    }
+    if across > 0 {
+        for k in 0..N {
+            means[k] = white * mean_of_sum(m[k], ds[k], dt[k]);
+        }
+    }
+    means
 }
 
 /// Middle of the box of these half widths in Lab whose mean linear sRGB this is: the inverse of [`mean_color`].
@@ -105,12 +184,18 @@ fn middle_of_mean(t: f64, ds: f64, dt: f64, near: f64) -> f64 {
 fn mean_of_sum(m: f64, ds: f64, dt: f64) -> f64 {
     let reach = ds + dt;
     if m - reach >= KNEE {
-        m * m * m + m * (ds * ds + dt * dt)
+        bright_mean_of_sum(m, ds, dt)
     } else if m + reach <= KNEE {
         expand(m)
     } else {
         mean_across_knee(m, ds, dt)
     }
+}
+
+/// The same wholly above the knee.
+#[inline(always)]
+fn bright_mean_of_sum(m: f64, ds: f64, dt: f64) -> f64 {
+    m * m * m + m * (ds * ds + dt * dt)
 }
 
 #[inline(never)]
@@ -248,6 +333,47 @@ mod tests {
             assert!(half > 1e-4 || single > 1.0 - 1e-9, "{half:e}: {single:e}");
         }
         assert!(plain(KNEE, 0.0, 0.0).is_nan() && mean_of_sum(KNEE, 0.0, 0.0) == expand(KNEE));
+    }
+
+    #[test]
+    fn boxes_side_by_side_have_the_means_that_they_have_alone() {
+        // Bright, dark, across the knee, thin, inside out, and no number; in eights, and what is left over.
+        let corner = |k: u32, up: f32| {
+            let l = (k * 37 % 101) as f32 * 0.4 - 9.0;
+            [
+                l + up,
+                (k * 13 % 50) as f32 - 25.0,
+                20.0 - (k % 7) as f32 * up,
+            ]
+        };
+        let lower: Vec<_> = (0..93).map(|k| corner(k, 0.0)).collect();
+        let mut upper: Vec<_> = (0..93).map(|k| corner(k, (k % 5) as f32 - 1.0)).collect();
+        upper[40][1] = f32::NAN;
+        for first in [0, 7, 90] {
+            let (lower, upper) = (&lower[first..], &upper[first..]);
+            let mut means = Vec::new();
+            mean_xyz_of_each(lower, upper, |xyz| means.push(xyz.map(f64::to_bits)));
+            let mut narrow = Vec::new();
+            let each = |xyz: [f64; 3]| narrow.push(xyz.map(f64::to_bits));
+            pulp::NullaryFnOnce::call(Means { lower, upper, each });
+            let alone = lower.iter().zip(upper).map(|(&low, &high)| {
+                let [lo, hi] = [low, high].map(|corner| corner.map(f64::from));
+                let half = |k: usize, scale: f64| (hi[k] - lo[k]).abs() * 0.5 * scale;
+                let middle = |k: usize| (lo[k] + hi[k]) * 0.5;
+                let y = (middle(0) + 16.0) * (1.0 / 116.0);
+                let dy = half(0, 1.0 / 116.0);
+                let x = middle(1) * (1.0 / 500.0) + y;
+                let z = y - middle(2) * (1.0 / 200.0);
+                [
+                    D65_2.x * mean_of_sum(x, dy, half(1, 1.0 / 500.0)),
+                    D65_2.y * mean_of_sum(y, dy, 0.0),
+                    D65_2.z * mean_of_sum(z, dy, half(2, 1.0 / 200.0)),
+                ]
+                .map(f64::to_bits)
+            });
+            assert_eq!(means, alone.collect::<Vec<_>>());
+            assert_eq!(means, narrow);
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::angle::AngleGrid;
-use super::box_color::mean_xyz;
+use super::box_color::mean_xyz_of_each;
 use super::shared_list::SharedList;
 use crate::color::{LinearRgb, xyz_to_rgb};
 
@@ -172,13 +172,14 @@ impl Slice<'_> {
     /// [`Slice::mean`]; `each` hears the mean luminance, of π f, of every cluster in turn.
     pub(crate) fn mean_of_boxes(&self, mut each: impl FnMut(f64)) -> LinearRgb {
         let mut sum = [0.0; 3];
-        for ((p, &lower), &upper) in self.probability.iter().zip(self.lower).zip(self.upper) {
-            let xyz = mean_xyz(lower, upper);
+        let mut probability = self.probability.iter();
+        mean_xyz_of_each(self.lower, self.upper, |xyz| {
             each(xyz[1]);
+            let p = probability.next().copied().unwrap_or_default();
             for k in 0..3 {
                 sum[k] += p * xyz[k];
             }
-        }
+        });
         xyz_to_rgb(sum).map(|s| s / std::f64::consts::PI)
     }
 

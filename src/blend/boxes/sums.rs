@@ -8,9 +8,9 @@ use pulp::Simd;
 use super::Account;
 use crate::paint::MAX_LAB;
 
-/// Numbers of a block, a whole number of corners and of registers: the blocks of two paints and their weights stay in the
+/// Numbers of a pattern of weights, a whole number of corners and of registers: the patterns of all paints stay in the
 /// nearest cache.
-pub(super) const BLOCK: usize = 768;
+pub(super) const PATTERN: usize = 768;
 
 /// Whether a magnitude is beyond ±[`MAX_LAB`].
 fn is_beyond(farthest: f32) -> bool {
@@ -78,6 +78,9 @@ impl<S: Simd> Seen<S> {
 
 /// One weight for all three axes, or weights that repeat along a block.
 pub(super) trait Weight {
+    /// Numbers that are summed in one go, a whole number of corners and of registers.
+    const BLOCK: usize;
+
     /// The weight of number `k` of a block.
     fn at(&self, k: usize) -> f32;
 
@@ -86,6 +89,9 @@ pub(super) trait Weight {
 }
 
 impl Weight for f32 {
+    /// So many that a block's own cost is nothing, and so few that they are still at hand when they are gone through again.
+    const BLOCK: usize = 8 * PATTERN;
+
     #[inline(always)]
     fn at(&self, _: usize) -> f32 {
         *self
@@ -97,7 +103,9 @@ impl Weight for f32 {
     }
 }
 
-impl Weight for [f32; BLOCK] {
+impl Weight for [f32; PATTERN] {
+    const BLOCK: usize = PATTERN;
+
     #[inline(always)]
     fn at(&self, k: usize) -> f32 {
         self[k]
@@ -130,7 +138,7 @@ pub(super) fn append_sums<const PAINTS: usize>(
     }
 }
 
-/// Both corners of a block of at most [`BLOCK`] numbers. If they may leave the range or turn inside out, they are to be
+/// Both corners of a block of at most [`Weight::BLOCK`] numbers. If they may leave the range or turn inside out, they are to be
 /// `WATCH`ed: then they are put in order and counted, and the answer is whether one is beyond ±[`MAX_LAB`].
 pub(super) fn sums<const PAINTS: usize, const WATCH: bool>(
     weights: &[impl Weight; PAINTS],
@@ -229,12 +237,13 @@ mod tests {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 f32::from_bits(0x3f80_0000 | state >> 9) * 300.0 - 450.0
             };
-            (0..BLOCK).map(|_| next()).collect()
+            (0..PATTERN).map(|_| next()).collect()
         };
         let paints: [Vec<f32>; 6] = std::array::from_fn(|k| corners(k as u32 + 1));
         let one = [1.3_f32, -0.7, 0.4];
-        let pattern = one.map(|w| std::array::from_fn::<f32, BLOCK, _>(|k| w / (1 + k % 3) as f32));
-        for count in [0, 3, 6, 9, 21, 765, BLOCK] {
+        let pattern =
+            one.map(|w| std::array::from_fn::<f32, PATTERN, _>(|k| w / (1 + k % 3) as f32));
+        for count in [0, 3, 6, 9, 21, 765, PATTERN] {
             let at = |k: usize| &paints[k][..count];
             let (lower, upper) = ([at(0), at(1), at(2)], [at(3), at(4), at(5)]);
             same_on_both(&one, lower, upper);
