@@ -7,15 +7,15 @@
 //! One pass reads every corner once and writes both corners of the sum; the number of paints is known to the compiler,
 //! so that the loop is as plain as `a·X + b·Y`. Only where a weight is negative can a box turn inside out: there its
 //! corners are put in order on the way. Whether a sum can leave ±[`MAX_LAB`] at all follows from the weights and the
-//! farthest corner, before anything is summed; if it can, a block that left is gone through again, number by number. Where
-//! a weight is large, every number is summed in 64 bits.
+//! farthest corner of each paint, before anything is summed; if it can, a block that left is gone through again, number by
+//! number. Where a weight is large, every number is summed in 64 bits.
 //! Boxes are not clamped to `L >= 0`, because the light they stand for is clamped once, when it is evaluated.
 
 mod sums;
 #[cfg(test)]
 mod tests;
 
-use self::sums::{PATTERN, Turned, Weight, append_sums, sums};
+use self::sums::{BLOCK, Turned, Weights, append_sums, sums};
 use super::clamp::Ledger;
 use super::{BlendedFlakes, Boxes};
 use crate::paint::{MAX_LAB, largest_magnitude};
@@ -63,26 +63,35 @@ impl Account {
     }
 }
 
-/// Magnitude that no number of any corner exceeds, infinite where a corner is no number.
-pub(super) fn reach(paints: &[Boxes]) -> f32 {
-    let lists = paints.iter().flat_map(|own| [&own.lower, &own.upper]);
-    lists
+/// Magnitude that no number of a paint's corners exceeds, infinite where one is no number.
+pub(super) fn reach(own: &Boxes) -> f32 {
+    [&own.lower, &own.upper]
         .map(|list| largest_magnitude(list.as_flattened()))
-        .map(|own| if own.is_nan() { f32::INFINITY } else { own })
+        .map(|far| if far.is_nan() { f32::INFINITY } else { far })
+        .into_iter()
         .fold(0.0, f32::max)
+}
+
+/// Magnitudes that no sum exceeds, on each axis; no number where a corner is none.
+fn farthest(reaches: &[f32], weights: &[[f64; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| {
+        let paints = reaches.iter().zip(weights);
+        let sum: f64 = paints.map(|(far, w)| w[axis].abs() * f64::from(*far)).sum();
+        sum * ROUNDING
+    })
 }
 
 /// `Σ_m w_m g_m` for both corners of every cluster into `out`; `weights` are per paint, for L, a and b.
 pub(super) fn mix_boxes(flakes: &BlendedFlakes, weights: &[[f64; 3]], out: &mut Boxes) -> Account {
-    let largest = |axis: usize| weights.iter().map(|w| w[axis].abs()).sum::<f64>();
-    let size = largest(0).max(largest(1)).max(largest(2));
-    let farthest = size * f64::from(flakes.reach) * ROUNDING;
+    let farthest = farthest(&flakes.reaches, weights);
     // Neither an overflow nor a weight of 0 for what is no number is for 32 bits.
-    let overflows = farthest.is_nan() || farthest > f64::from(f32::MAX);
+    let overflows = farthest
+        .iter()
+        .any(|far| far.is_nan() || *far > f64::from(f32::MAX));
     if overflows || weights.iter().flatten().any(|w| w.abs() > MODERATE) {
         return wide(&flakes.boxes, weights, out);
     }
-    let leaves = farthest > MAX_LAB;
+    let leaves = farthest.iter().any(|far| *far > MAX_LAB);
     match flakes.boxes.as_slice() {
         [a, b] => narrow([a, b], weights, leaves, out),
         [a, b, c] => narrow([a, b, c], weights, leaves, out),
@@ -124,23 +133,11 @@ fn narrow<const PAINTS: usize>(
     out: &mut Boxes,
 ) -> Account {
     #[allow(clippy::cast_possible_truncation)] // moderate weights of texels
-    let weights: [[f32; 3]; PAINTS] = std::array::from_fn(|m| weights[m].map(|w| w as f32));
+    let weights: [Weights; PAINTS] = std::array::from_fn(|m| weights[m].map(|w| w as f32));
     // Weights that are not negative keep corners in order, for rounding does.
     let turns = weights.as_flattened().iter().any(|w| *w < 0.0);
-    if weights.iter().all(|w| *w == [w[0]; 3]) {
-        return blocks(paints, &weights.map(|w| w[0]), leaves || turns, out);
-    }
-    let patterns: [[f32; PATTERN]; PAINTS] =
-        weights.map(|axes| std::array::from_fn(|k| axes[k % 3]));
-    blocks(paints, &patterns, leaves || turns, out)
-}
-
-fn blocks<W: Weight, const PAINTS: usize>(
-    paints: [&Boxes; PAINTS],
-    weights: &[W; PAINTS],
-    watch: bool,
-    out: &mut Boxes,
-) -> Account {
+    let watch = leaves || turns;
+    let is_plain = !watch && weights.iter().all(|w| *w == [w[0]; 3]);
     let mut account = Account::default();
     let numbers = paints[0].lower.as_flattened().len();
     let mut lists =
@@ -152,27 +149,27 @@ fn blocks<W: Weight, const PAINTS: usize>(
             list.reserve_exact(numbers);
         }
     }
-    for first in (0..numbers).step_by(W::BLOCK) {
-        let here = first..(first + W::BLOCK).min(numbers);
+    for first in (0..numbers).step_by(BLOCK) {
+        let here = first..(first + BLOCK).min(numbers);
         let [lower, upper] = [
             paints.map(|own| &own.lower.as_flattened()[here.clone()]),
             paints.map(|own| &own.upper.as_flattened()[here.clone()]),
         ];
         if lists[0].len() < here.end {
-            if !watch {
-                append_sums(weights, lower, upper, &mut lists);
+            if is_plain {
+                append_sums(&weights.map(|w| w[0]), lower, upper, &mut lists);
                 continue;
             }
-            // New memory is cleared block by block: the nearest cache holds a block until its sums are there.
+            // New memory is cleared block by block: a cache holds a block until its sums are there.
             for list in &mut lists {
                 list.resize(here.end, 0.0);
             }
         }
         let out = lists.each_mut().map(|list| &mut list[here.clone()]);
         let beyond = if watch {
-            sums::<PAINTS, true>(weights, lower, upper, out, &mut account)
+            sums::<PAINTS, true>(&weights, lower, upper, out, &mut account)
         } else {
-            sums::<PAINTS, false>(weights, lower, upper, out, &mut account)
+            sums::<PAINTS, false>(&weights, lower, upper, out, &mut account)
         };
         let [low, high] = lists.each_mut().map(|list| &mut list[here.clone()]);
         if beyond {

@@ -94,8 +94,8 @@ pub(crate) struct BlendedFlakes {
     pub probability: SharedList<f64>,
     /// Boxes of each paint, one list a paint, in the order of `Blend::paints`.
     pub boxes: Vec<Boxes>,
-    /// Magnitude that no number of any corner exceeds, Lab.
-    pub reach: f32,
+    /// Magnitude that no number of any corner exceeds, Lab; one a paint.
+    pub reaches: Vec<f32>,
     pub textures: Vec<FlakeTexture>,
 }
 
@@ -120,7 +120,7 @@ impl BlendedFlakes {
             theta_d,
             offsets,
             probability,
-            reach: boxes::reach(&boxes),
+            reaches: boxes.iter().map(boxes::reach).collect(),
             boxes,
             textures,
         }

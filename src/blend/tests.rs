@@ -461,6 +461,39 @@ fn far_weights_stay_valid_and_say_what_was_held() {
 }
 
 #[test]
+fn colors_of_a_table_that_leave_the_range_are_held_and_counted() {
+    let (a, b) = (paint(16, H, D), paint(17, H, D));
+    let weights = [-60.0, 100.0];
+    let realised = blend(&[&a, &b])
+        .realise(&RealisationWeights::uniform(weights.to_vec()))
+        .expect("finite");
+    let labs = |paint: &CarPaint| -> Vec<f64> {
+        let table = &paint.color_table;
+        let all = table.nodes().iter().copied().chain([table.overall()]);
+        all.flat_map(Lab::to_array).collect()
+    };
+    let pairs = labs(&a).into_iter().zip(labs(&b));
+    let sums: Vec<f64> = pairs
+        .map(|(a, b)| weights[0] * a + weights[1] * b)
+        .collect();
+    let beyond = || {
+        sums.iter()
+            .map(|v| v.abs() - 2000.0)
+            .filter(|far| *far > 0.0)
+    };
+    let told = realised.clamps.iter().find(|c| c.field == "color_table");
+    let told = told.expect("a lightness of 70 goes to 2800");
+    assert_eq!((told.count, told.of), (beyond().count(), sums.len()));
+    assert!((told.worst - beyond().fold(0.0, f64::max)).abs() < 1e-9);
+    for (held, sum) in labs(&realised.paint).iter().zip(&sums) {
+        assert!(
+            (held - sum.clamp(-2000.0, 2000.0)).abs() < 1e-9,
+            "{held} {sum}"
+        );
+    }
+}
+
+#[test]
 fn weights_that_are_none_are_refused_by_field_and_value() {
     let blend = blend(&[&paint(19, H, D), &paint(20, H, D)]);
     let error = |w: RealisationWeights| blend.realise(&w).expect_err("refused").to_string();

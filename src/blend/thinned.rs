@@ -47,7 +47,7 @@ impl BlendedFlakes {
             probability: SharedList::default(),
             boxes: vec![Boxes::default(); self.boxes.len()],
             textures: self.textures.clone(),
-            reach: self.reach,
+            reaches: self.reaches.clone(),
         };
         for &h in theta_h {
             for &d in theta_d {

@@ -8,9 +8,15 @@ use pulp::Simd;
 use super::Account;
 use crate::paint::MAX_LAB;
 
-/// Numbers of a pattern of weights, a whole number of corners and of registers: the patterns of all paints stay in the
-/// nearest cache.
-pub(super) const PATTERN: usize = 768;
+/// Numbers that are summed in one go, a whole number of corners and of registers: so many that a block's own cost is
+/// nothing, and so few that they are still at hand when they are gone through again.
+pub(super) const BLOCK: usize = 6144;
+
+/// Weights of a paint for L, a and b.
+pub(super) type Weights = [f32; 3];
+
+/// Most lanes of a register.
+const MOST_LANES: usize = 16;
 
 /// Whether a magnitude is beyond ±[`MAX_LAB`].
 fn is_beyond(farthest: f32) -> bool {
@@ -76,78 +82,37 @@ impl<S: Simd> Seen<S> {
     }
 }
 
-/// One weight for all three axes, or weights that repeat along a block.
-pub(super) trait Weight {
-    /// Numbers that are summed in one go, a whole number of corners and of registers.
-    const BLOCK: usize;
-
-    /// The weight of number `k` of a block.
-    fn at(&self, k: usize) -> f32;
-
-    /// The weights of register `k` of a block.
-    fn register<S: Simd>(&self, simd: S, k: usize) -> S::f32s;
-}
-
-impl Weight for f32 {
-    /// So many that a block's own cost is nothing, and so few that they are still at hand when they are gone through again.
-    const BLOCK: usize = 8 * PATTERN;
-
-    #[inline(always)]
-    fn at(&self, _: usize) -> f32 {
-        *self
-    }
-
-    #[inline(always)]
-    fn register<S: Simd>(&self, simd: S, _: usize) -> S::f32s {
-        simd.splat_f32s(*self)
-    }
-}
-
-impl Weight for [f32; PATTERN] {
-    const BLOCK: usize = PATTERN;
-
-    #[inline(always)]
-    fn at(&self, k: usize) -> f32 {
-        self[k]
-    }
-
-    #[inline(always)]
-    fn register<S: Simd>(&self, _: S, k: usize) -> S::f32s {
-        S::as_simd_f32s(self).0[k]
-    }
-}
-
-/// What [`sums`] does unwatched, at the end of two lists: new memory need not be cleared for it.
+/// What [`sums`] does unwatched where a paint's weights are one for all axes, at the end of two lists: new memory need not
+/// be cleared for it.
 #[inline(never)]
 pub(super) fn append_sums<const PAINTS: usize>(
-    weights: &[impl Weight; PAINTS],
+    weights: &[f32; PAINTS],
     lower: [&[f32]; PAINTS],
     upper: [&[f32]; PAINTS],
     lists: &mut [Vec<f32>; 2],
 ) {
     for (list, corners) in lists.iter_mut().zip([lower, upper]) {
         let first = list.len();
-        let pairs = corners[0].iter().zip(corners[1]).enumerate();
-        let sums = pairs.map(|(k, (own, other))| weights[0].at(k) * own + weights[1].at(k) * other);
-        list.extend(sums);
+        let pairs = corners[0].iter().zip(corners[1]);
+        list.extend(pairs.map(|(own, other)| weights[0] * own + weights[1] * other));
         for (weight, corners) in weights.iter().zip(corners).skip(2) {
-            for (k, (sum, own)) in list[first..].iter_mut().zip(corners).enumerate() {
-                *sum += weight.at(k) * own;
+            for (sum, own) in list[first..].iter_mut().zip(corners) {
+                *sum += weight * own;
             }
         }
     }
 }
 
-/// Both corners of a block of at most [`Weight::BLOCK`] numbers. If they may leave the range or turn inside out, they are to be
+/// Both corners of a block of at most [`BLOCK`] numbers. If they may leave the range or turn inside out, they are to be
 /// `WATCH`ed: then they are put in order and counted, and the answer is whether one is beyond ±[`MAX_LAB`].
 pub(super) fn sums<const PAINTS: usize, const WATCH: bool>(
-    weights: &[impl Weight; PAINTS],
+    weights: &[Weights; PAINTS],
     lower: [&[f32]; PAINTS],
     upper: [&[f32]; PAINTS],
     out: [&mut [f32]; 2],
     account: &mut Account,
 ) -> bool {
-    let (farthest, turned) = pulp::Arch::new().dispatch(Sums::<_, PAINTS, WATCH> {
+    let (farthest, turned) = pulp::Arch::new().dispatch(Sums::<PAINTS, WATCH> {
         weights,
         lower,
         upper,
@@ -158,16 +123,22 @@ pub(super) fn sums<const PAINTS: usize, const WATCH: bool>(
 }
 
 /// A block with all it needs, compiled once for every processor and once for those with wide registers.
-struct Sums<'a, W, const PAINTS: usize, const WATCH: bool> {
-    weights: &'a [W; PAINTS],
+struct Sums<'a, const PAINTS: usize, const WATCH: bool> {
+    weights: &'a [Weights; PAINTS],
     lower: [&'a [f32]; PAINTS],
     upper: [&'a [f32]; PAINTS],
     out: [&'a mut [f32]; 2],
 }
 
-impl<'a, W: Weight, const PAINTS: usize, const WATCH: bool> pulp::WithSimd
-    for Sums<'a, W, PAINTS, WATCH>
-{
+/// The weights of the registers of a block: whatever their width, they repeat after three.
+#[inline(always)]
+fn registers<S: Simd>(weights: Weights) -> [S::f32s; 3] {
+    let lanes: [f32; 3 * MOST_LANES] = std::array::from_fn(|k| weights[k % 3]);
+    let registers = S::as_simd_f32s(&lanes).0;
+    [registers[0], registers[1], registers[2]]
+}
+
+impl<'a, const PAINTS: usize, const WATCH: bool> pulp::WithSimd for Sums<'a, PAINTS, WATCH> {
     type Output = (f32, Turned);
 
     #[inline(always)]
@@ -177,57 +148,79 @@ impl<'a, W: Weight, const PAINTS: usize, const WATCH: bool> pulp::WithSimd
         let (lows, low_rest) = S::as_mut_simd_f32s(low);
         let (highs, high_rest) = S::as_mut_simd_f32s(high);
         let count = lows.len().min(highs.len());
-        let registers = |own: &'a [f32]| &S::as_simd_f32s(own).0[..count];
-        let (lower, upper) = (self.lower.map(registers), self.upper.map(registers));
-        for k in 0..count {
-            let mut sums = [simd.splat_f32s(0.0); 2];
-            for m in 0..PAINTS {
-                let weight = self.weights[m].register(simd, k);
-                sums = add(simd, m, sums, weight, [lower[m][k], upper[m][k]]);
+        let wholes = |own: &'a [f32]| &S::as_simd_f32s(own).0[..count];
+        let (lower, upper) = (self.lower.map(wholes), self.upper.map(wholes));
+        let weights = self.weights.map(registers::<S>);
+        let whole = count / 3 * 3;
+        for first in (0..whole).step_by(3) {
+            for turn in 0..3 {
+                let k = first + turn;
+                let own = Corners { lower, upper, k };
+                [lows[k], highs[k]] = own.sums::<S, WATCH>(simd, &weights, turn, &mut seen);
             }
-            if WATCH {
-                sums = seen.watch(sums);
-            }
-            [lows[k], highs[k]] = sums;
+        }
+        for turn in 0..count - whole {
+            let k = whole + turn;
+            let own = Corners { lower, upper, k };
+            [lows[k], highs[k]] = own.sums::<S, WATCH>(simd, &weights, turn, &mut seen);
         }
         if !low_rest.is_empty() {
-            let mut sums = [simd.splat_f32s(0.0); 2];
-            for m in 0..PAINTS {
-                let weight = self.weights[m].register(simd, count);
-                let low = simd.partial_load_f32s(S::as_simd_f32s(self.lower[m]).1);
-                let high = simd.partial_load_f32s(S::as_simd_f32s(self.upper[m]).1);
-                sums = add(simd, m, sums, weight, [low, high]);
-            }
-            if WATCH {
-                sums = seen.watch(sums);
-            }
-            simd.partial_store_f32s(low_rest, sums[0]);
-            simd.partial_store_f32s(high_rest, sums[1]);
+            let rest = |own: &'a [f32]| simd.partial_load_f32s(S::as_simd_f32s(own).1);
+            let (lower, upper) = (self.lower.map(rest), self.upper.map(rest));
+            let own = Corners {
+                lower: lower.each_ref().map(std::slice::from_ref),
+                upper: upper.each_ref().map(std::slice::from_ref),
+                k: 0,
+            };
+            let [low, high] = own.sums::<S, WATCH>(simd, &weights, count - whole, &mut seen);
+            simd.partial_store_f32s(low_rest, low);
+            simd.partial_store_f32s(high_rest, high);
         }
         seen.close()
     }
 }
 
-/// The sums with another paint's corners; the first paint's stand alone.
-#[inline(always)]
-fn add<S: Simd>(
-    simd: S,
-    paint: usize,
-    [low, high]: [S::f32s; 2],
-    weight: S::f32s,
-    corners: [S::f32s; 2],
-) -> [S::f32s; 2] {
-    let own_low = simd.mul_f32s(weight, corners[0]);
-    let own_high = simd.mul_f32s(weight, corners[1]);
-    if paint == 0 {
-        return [own_low, own_high];
+/// Register `k` of both corners of every paint.
+struct Corners<'a, T, const PAINTS: usize> {
+    lower: [&'a [T]; PAINTS],
+    upper: [&'a [T]; PAINTS],
+    k: usize,
+}
+
+impl<T: Copy, const PAINTS: usize> Corners<'_, T, PAINTS> {
+    #[inline(always)]
+    fn sums<S: Simd<f32s = T>, const WATCH: bool>(
+        &self,
+        simd: S,
+        weights: &[[T; 3]; PAINTS],
+        turn: usize,
+        seen: &mut Seen<S>,
+    ) -> [T; 2] {
+        let mut sums = [simd.splat_f32s(0.0); 2];
+        for m in 0..PAINTS {
+            let own = [self.lower[m][self.k], self.upper[m][self.k]];
+            for (sum, own) in sums.iter_mut().zip(own) {
+                let own = simd.mul_f32s(weights[m][turn], own);
+                // The first paint's stand alone: nothing and -0 would be 0.
+                *sum = if m == 0 {
+                    own
+                } else {
+                    simd.add_f32s(*sum, own)
+                };
+            }
+        }
+        if WATCH {
+            sums = seen.watch(sums);
+        }
+        sums
     }
-    [simd.add_f32s(low, own_low), simd.add_f32s(high, own_high)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const LENGTH: usize = 768;
 
     #[test]
     fn every_width_of_registers_gives_the_same_bits() {
@@ -237,38 +230,55 @@ mod tests {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 f32::from_bits(0x3f80_0000 | state >> 9) * 300.0 - 450.0
             };
-            (0..PATTERN).map(|_| next()).collect()
+            (0..LENGTH).map(|_| next()).collect()
         };
         let paints: [Vec<f32>; 6] = std::array::from_fn(|k| corners(k as u32 + 1));
-        let one = [1.3_f32, -0.7, 0.4];
-        let pattern =
-            one.map(|w| std::array::from_fn::<f32, PATTERN, _>(|k| w / (1 + k % 3) as f32));
-        for count in [0, 3, 6, 9, 21, 765, PATTERN] {
+        let one = [1.3_f32, -0.7, 0.4].map(|w| [w; 3]);
+        let three = [1.3_f32, -0.7, 0.4].map(|w| [w, w / 2.0, w / 3.0]);
+        for count in [0, 3, 6, 9, 21, 765, LENGTH] {
             let at = |k: usize| &paints[k][..count];
             let (lower, upper) = ([at(0), at(1), at(2)], [at(3), at(4), at(5)]);
             same_on_both(&one, lower, upper);
-            same_on_both(&pattern, lower, upper);
+            same_on_both(&three, lower, upper);
         }
     }
 
-    fn same_on_both(weights: &[impl Weight; 3], lower: [&[f32]; 3], upper: [&[f32]; 3]) {
+    fn bits(list: &[f32]) -> Vec<u32> {
+        list.iter().map(|x| x.to_bits()).collect()
+    }
+
+    fn same_on_both(weights: &[Weights; 3], lower: [&[f32]; 3], upper: [&[f32]; 3]) {
         let sized = || vec![0.0_f32; lower[0].len()];
         let (mut low, mut high, mut narrow_low, mut narrow_high) =
             (sized(), sized(), sized(), sized());
-        let (farthest, turned) = pulp::Arch::new().dispatch(Sums::<_, 3, true> {
+        let (farthest, turned) = pulp::Arch::new().dispatch(Sums::<3, true> {
             weights,
             lower,
             upper,
             out: [&mut low, &mut high],
         });
-        let narrow = pulp::Scalar::new().vectorize(Sums::<_, 3, true> {
+        let (mut plain, mut other) = ([sized(), sized()], [sized(), sized()]);
+        let unwatched = pulp::Arch::new().dispatch(Sums::<3, false> {
+            weights,
+            lower,
+            upper,
+            out: plain.each_mut().map(Vec::as_mut_slice),
+        });
+        let narrow = pulp::Scalar::new().vectorize(Sums::<3, false> {
+            weights,
+            lower,
+            upper,
+            out: other.each_mut().map(Vec::as_mut_slice),
+        });
+        assert_eq!((unwatched, unwatched.0), (narrow, 0.0));
+        assert_eq!(plain.map(|list| bits(&list)), other.map(|list| bits(&list)));
+        let narrow = pulp::Scalar::new().vectorize(Sums::<3, true> {
             weights,
             lower,
             upper,
             out: [&mut narrow_low, &mut narrow_high],
         });
         assert_eq!(narrow, (farthest, turned));
-        let bits = |list: &[f32]| list.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&low), bits(&narrow_low));
         assert_eq!(bits(&high), bits(&narrow_high));
         assert!(low.iter().zip(&high).all(|(low, high)| low <= high));

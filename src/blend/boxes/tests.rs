@@ -85,8 +85,14 @@ fn a_weight_of_one_gives_the_very_boxes() {
 /// Two to five paints; weights that may turn boxes and such that may not; sums that leave the range and that do not.
 #[test]
 fn lists_that_were_used_before_give_the_same() {
-    for (count, paints) in [(500, 2), (999, 3), (256, 4), (1000, 5)] {
-        for (share, first) in [(0.3, 0.4), (-0.4, 1.9), (1.2, 0.9)] {
+    // A block is 2048 corners.
+    for (count, paints) in [(500, 2), (4999, 2), (2049, 3), (256, 4), (1000, 5)] {
+        for (share, first, axes) in [
+            (0.3, 0.4, [1.0; 3]),
+            (0.3, 0.4, [1.0, 0.5, 0.25]),
+            (-0.4, 1.9, [1.0; 3]),
+            (1.2, 0.9, [1.0, 1.0, 0.5]),
+        ] {
             for far in [0.0_f32, 980.0] {
                 let all = || -> Vec<Boxes> {
                     let moved = |m: usize| {
@@ -98,8 +104,8 @@ fn lists_that_were_used_before_give_the_same() {
                     };
                     (0..paints).map(moved).collect()
                 };
-                let mut weights = vec![[share; 3]; paints];
-                weights[0] = [first; 3];
+                let mut weights = vec![axes.map(|axis| axis * share); paints];
+                weights[0] = axes.map(|axis| axis * first);
                 let fresh = mixed(all(), &weights);
                 let leaves = fresh.1.beyond > 0;
                 let sum = first + share * (paints - 1) as f64;
@@ -109,9 +115,10 @@ fn lists_that_were_used_before_give_the_same() {
                     let account = mix_boxes(&flakes(all()), &weights, &mut out);
                     assert_eq!((&out, &account), (&fresh.0, &fresh.1));
                 }
+                let all = all();
                 for k in 0..count {
                     for axis in 0..3 {
-                        let plain = plainly(&all(), &weights, k, axis);
+                        let plain = plainly(&all, &weights, k, axis);
                         let own = [fresh.0.lower[k][axis], fresh.0.upper[k][axis]];
                         // Five products and sums of at most 1.9 · 1000.
                         let close = |(x, y): (f32, f64)| (f64::from(x) - y).abs() < 5e-3;
@@ -134,6 +141,22 @@ fn moderate_and_large_weights_meet_where_they_part() {
     for (a, b) in corners.zip(wide.lower.iter().chain(&wide.upper).flatten()) {
         // Four products and sums of at most 4 · 70.
         assert!((a - b).abs() <= 4.0 * 280.0 * f32::EPSILON, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_paint_that_reaches_the_bound_leaves_the_range_only_with_others_that_reach_far() {
+    let one = |far: f32| Boxes {
+        lower: vec![[-far; 3]],
+        upper: vec![[far; 3]],
+    };
+    for (other, weight, leaves) in [(300.0, 0.5, false), (1900.0, 0.6, true)] {
+        let (pair, weights) = (vec![one(2000.0), one(other)], [[weight; 3]; 2]);
+        let most = farthest(&flakes(pair.clone()).reaches, &weights);
+        assert!(most.iter().all(|far| (*far > MAX_LAB) == leaves));
+        let (out, account) = mixed(pair, &weights);
+        assert_eq!(account.beyond, if leaves { 3 } else { 0 });
+        assert!(out.upper[0][0] <= 2000.0, "{out:?}");
     }
 }
 
@@ -162,6 +185,14 @@ fn corners_that_are_no_numbers_are_never_summed_quickly() {
     let mut paints = vec![boxes(20, 0.0), boxes(20, 1.0)];
     for worst in [f32::NAN, f32::NEG_INFINITY] {
         paints[1].upper[19][2] = worst;
-        assert_eq!(reach(&paints), f32::INFINITY);
+        let flakes = flakes(paints.clone());
+        assert_eq!(flakes.reaches[1], f32::INFINITY);
+        let weights = [[1.0; 3], [0.0; 3]];
+        assert!(farthest(&flakes.reaches, &weights)[2].is_nan());
+        // Its sum is none, even without weight: the other corner stands in for it.
+        let mut out = Boxes::default();
+        mix_boxes(&flakes, &weights, &mut out);
+        assert_eq!(out.upper[19][2], paints[0].lower[19][2]);
+        assert_eq!(out.upper[..19], paints[0].upper[..19]);
     }
 }
