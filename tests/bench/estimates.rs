@@ -54,6 +54,10 @@ fn main() -> Outcome<()> {
             "--out x.blend",
         ),
         (
+            "blend polaris_silber.paint ford_f8.paint --knob transport=sinkhorn --knob epsilon=0.02",
+            "--out x.blend",
+        ),
+        (
             "blend sample:polaris_silber sample:opel_titan",
             "--out x.blend",
         ),

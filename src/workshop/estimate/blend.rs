@@ -2,7 +2,7 @@
 
 use super::ingest::{Sampled, of_paint, sample};
 use super::{
-    COLD, Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, shortest, this_machine,
+    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, cold, extrapolated, steady, this_machine,
     timed, write_stage,
 };
 use crate::accuracy::{Profile, blend_error};
@@ -46,15 +46,21 @@ pub fn estimate_blend_of(
 }
 
 /// Angles of the samples. Where a blend is compared with what each pair could have alone, or with exact transport, that
-/// is done on some slices of a large grid and on all of a small one: samples have to be beyond that.
+/// is done on some slices of a large grid and on all of a small one: samples have to be beyond that. Beside Sinkhorn steps
+/// the comparison is nothing, and they are long enough as they are.
 fn sizes(paints: usize, profile: &Profile) -> Sizes {
-    let alike = profile.blend.method == Method::Exact && profile.blend.cost == Cost::Distance;
-    if paints == 2 && alike {
-        FEW_ANGLES
-    } else {
-        MANY_ANGLES
+    match (paints, profile.blend.method, profile.blend.cost) {
+        (2, Method::Exact, Cost::Distance) => FEW_ANGLES,
+        (2, Method::Sinkhorn { .. }, _) => SOME_ANGLES,
+        _ => MANY_ANGLES,
     }
 }
+
+/// Goes of a sample that takes little time.
+const GOES: usize = 3;
+
+/// Angles of samples of slices that are slow.
+const SOME_ANGLES: Sizes = [4, 8];
 
 /// Angles of samples of more slices than are compared.
 const MANY_ANGLES: Sizes = [9, 14];
@@ -80,9 +86,8 @@ fn of_samples(
 ) -> Result<Estimate, WorkshopError> {
     let go = |which: usize| -> Result<(f64, Blend), WorkshopError> {
         let paints: Vec<&PaintFile> = sampled.iter().map(|s| &s.paints[which]).collect();
-        let (seconds, made) = shortest(|| blend_paints(&paints, profile, &|_| ()));
-        // Whoever blends once does not find memory and threads warm.
-        Ok((seconds * COLD, made?.blend))
+        let (seconds, made) = steady(GOES, || blend_paints(&paints, profile, &|_| ()));
+        Ok((seconds, made?.blend))
     };
     let (small, large) = (go(0)?, go(1)?);
     // Paints of one grid blend on it; of several, on what their angles make together.
@@ -113,7 +118,9 @@ fn of_samples(
     let mut stages: Vec<Stage> = sampled.iter().flat_map(|s| s.stages.clone()).collect();
     stages.push(Stage {
         stage: "blend",
-        seconds: at(small.0, large.0) + sampled.iter().map(|s| s.thinning).sum::<f64>(),
+        // Whoever blends once does not find memory and threads warm.
+        seconds: cold(large.0) * at(small.0, large.0)
+            + sampled.iter().map(|s| s.thinning).sum::<f64>(),
     });
     let encode = at(encode_small, encode_large);
     let write = |bytes| this_machine().write_seconds(bytes).unwrap_or(0.0);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::machine::{fitted_stand_in, stand_in};
 use super::{
-    COLD, Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, extrapolated, left_at, steady,
+    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, cold, extrapolated, left_at, steady,
     step_for, this_machine, timed, wanted_on, write_stage,
 };
 use crate::accuracy::{
@@ -83,6 +83,9 @@ fn in_full(
     };
     Ok((paint, stages.map(stage).collect()))
 }
+
+/// Goes of a sample that takes little time.
+const GOES: usize = 6;
 
 /// What a name means, to estimate work on it: files that are paints or blends as they are, of measurements and samples a
 /// few angles, with what opening them in full will take.
@@ -304,7 +307,7 @@ fn fitted(
         let wanted = wanted_on(angles, wanted);
         let steps = [0, 1].map(|axis| every * step_for(angles[axis], wanted[axis]));
         let thinned = Thinned::by_steps(pictures, steps);
-        let (seconds, fitted) = steady(|| fit_flakes(&thinned, &settings, &|_, _| ()));
+        let (seconds, fitted) = steady(GOES, || fit_flakes(&thinned, &settings, &|_, _| ()));
         Ok((seconds, fitted.map_err(|e| WorkshopError::input(name, e))?))
     };
     let (small, large) = (go(sizes[0])?, go(sizes[1])?);
@@ -312,7 +315,8 @@ fn fitted(
     let whole = (angles[0] * angles[1]) as f64;
     stages.push(Stage {
         stage: "flakes",
-        seconds: COLD * extrapolated((size(&small.1), small.0), (size(&large.1), large.0), whole),
+        seconds: cold(large.0)
+            * extrapolated((size(&small.1), small.0), (size(&large.1), large.0), whole),
     });
     let mut paints = [small.1, large.1].map(|fitted| {
         let paint = CarPaint {

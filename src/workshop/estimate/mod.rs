@@ -190,11 +190,16 @@ const COLD: f64 = 1.2;
 /// Seconds below which one go says little.
 const SHORT: f64 = 0.05;
 
-/// The shortest of several goes of what is short, one of what is long.
-fn steady<T>(mut work: impl FnMut() -> T) -> (f64, T) {
-    const GOES: usize = 6;
+/// What the only go takes longer than [`steady`] goes whose shortest took so many seconds: one that was long was itself
+/// the only one.
+fn cold(seconds: f64) -> f64 {
+    if seconds > SHORT { 1.0 } else { COLD }
+}
+
+/// The shortest of so many goes of what is short, one of what is long.
+fn steady<T>(goes: usize, mut work: impl FnMut() -> T) -> (f64, T) {
     let (mut least, mut made) = timed(&mut work);
-    for _ in 1..GOES {
+    for _ in 1..goes {
         if least > SHORT {
             break;
         }

@@ -76,10 +76,11 @@ pub(super) fn pick_samples(
         }
         fit
     };
-    let (samples, error) = match target.max_error {
+    let (samples, in_time_at_all, error) = match target.max_error {
         None => {
-            let samples = in_time(telling(in_time(0.0))).max(1);
-            (samples, measure(samples)?)
+            let most = in_time(telling(in_time(0.0)));
+            let samples = most.max(1);
+            (samples, most > 0, measure(samples)?)
         }
         Some(allowed) => {
             let of_few = measure(few)?;
@@ -97,7 +98,8 @@ pub(super) fn pick_samples(
                     error: of.samples,
                 }))
             })?;
-            let samples = wanted.samples.min(in_time(0.0).max(1));
+            let most = in_time(0.0);
+            let samples = wanted.samples.min(most.max(1));
             // Chance that was reckoned is no promise.
             let is_known = measured.borrow().contains(&samples);
             let error = if is_known && samples == wanted.samples {
@@ -109,15 +111,22 @@ pub(super) fn pick_samples(
             } else {
                 of_few.unmeasured()
             };
-            (samples, error)
+            (samples, most > 0, error)
         }
     };
     let profile = Profile {
         samples_per_pixel: samples,
         ..Profile::standard()
     };
+    let mut tried = 1 + measured.borrow().len();
+    let small = if in_time_at_all {
+        small
+    } else {
+        // Of many samples a pixel takes longer than their share: what is told of a single one is looked at by itself.
+        tried += 1;
+        SmallPictures::to_search(picture, samples)?
+    };
     let estimate = small.estimate(picture, &profile, &error);
-    let tried = 1 + measured.borrow().len();
     Ok(target.picked(estimate, tried, search.seconds()))
 }
 
