@@ -313,6 +313,10 @@ mod tests {
         for (text, named) in [
             ("cluster=3", "`clusters`"),
             (
+                "clusters",
+                "clusters has no value, accepted is clusters= and a whole number from 1 to 4096",
+            ),
+            (
                 "clusters=10,draft,clusters=20",
                 "clusters is set twice, to 10 and to 20, accepted is one of the two",
             ),

@@ -12,6 +12,7 @@ use super::output;
 use super::preview::{FrameArgs, ShowName, refuse_samples_of_angles, refuse_samples_twice};
 use super::profile::TargetArgs;
 use super::weights::WeightArgs;
+use crate::accuracy::Knobs;
 use crate::workshop::{
     Estimate as Estimated, Format, IngestOptions, PictureFormat, PictureWork, PreviewOptions,
     Stage, Work, WorkshopError, open, read_environment, sample_to_estimate,
@@ -165,7 +166,7 @@ impl Estimate {
         let why = estimate.error.unknown;
         output::print(&format!(
             "profile: {}\nseconds: {:.3} ({})\nbytes: {}\nerror: {}{}\n",
-            estimate.profile,
+            Knobs::told(&estimate.knobs),
             estimate.seconds,
             stages.join(", "),
             estimate.bytes,

@@ -29,6 +29,10 @@ pub struct Study {
 
 impl Study {
     pub fn run(&self, json: bool) -> Result<(), WorkshopError> {
+        if self.out.exists() && !self.out.is_dir() {
+            let problem = format!("{} is a file, accepted is a folder", self.out.display());
+            return Err(WorkshopError::usage("--out", problem));
+        }
         std::fs::create_dir_all(&self.out)
             .map_err(|e| WorkshopError::output(self.out.display(), e))?;
         let progress = Progress::new("studying");

@@ -35,6 +35,13 @@ fn mistakes_are_told_with_their_own_exit_codes() {
             "b.blend",
         ],
     );
+    fs::write(desk.path("file"), b"").expect("written");
+    let said = desk.refused(2, &["study", "--out", "file"]);
+    assert!(
+        said.contains("file is a file, accepted is a folder"),
+        "{said}"
+    );
+    fs::remove_file(desk.path("file")).expect("removed");
     desk.refused(3, &["show", "nothing-here"]);
     desk.refused(
         4,

@@ -58,7 +58,7 @@ fn knobs_are_turned_by_name_and_unknown_ones_are_refused_with_what_there_is() {
     desk.refused(2, &export(&["--knob", "clusters=9", "--clusters", "10"]));
     desk.ok(&export(&["--knob", "clusters=9", "--clusters", "9"]));
     let said = desk.refused(2, &export(&["--knob", "clusters"]));
-    assert!(said.contains("clusters=100"), "{said}");
+    assert!(said.contains("clusters has no value"), "{said}");
     fs::write(
         desk.path("bad.json"),
         r#"{"preset": "draft", "samples": 9}"#,
@@ -223,6 +223,20 @@ fn an_estimate_knows_the_bytes_and_the_error_of_what_then_happens() {
     let estimate = [&["estimate"], &asked[..], &["--json"]].concat();
     let estimate = json(&desk.ok(&estimate).stdout);
     assert!(estimate["seconds"].as_f64().expect("seconds") > 0.0);
+    let turned = [
+        "estimate",
+        "blend",
+        "sample:white",
+        "sample:blue",
+        "--knob",
+        "cost=squared",
+    ];
+    let told = desk.ok(&turned).stdout;
+    let told = String::from_utf8(told).expect("text");
+    assert!(
+        told.starts_with("profile: standard,cost=squared\n"),
+        "{told}"
+    );
     let made = [&asked[..], &["--json", "--out", "x.blend"]].concat();
     let made = json(&desk.ok(&made).stdout);
     let bytes = desk.read("x.blend").len() as f64;

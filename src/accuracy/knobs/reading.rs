@@ -73,6 +73,12 @@ impl Knobs {
     }
 }
 
+/// Whether there is a knob of this name; nothing is a value that any knob takes.
+fn is_knob(name: &str) -> bool {
+    let nothing = Map::from_iter([(name.to_owned(), Value::Null)]);
+    Knobs::of_object(nothing).is_ok()
+}
+
 impl FromStr for Knobs {
     type Err = ProfileError;
 
@@ -83,6 +89,12 @@ impl FromStr for Knobs {
             let (name, value) = match part.split_once('=') {
                 Some((name, value)) => (name.trim(), value.trim()),
                 None if PRESETS.contains(&part) => ("preset", part),
+                None if is_knob(part) => {
+                    let accepted = super::accepted(part);
+                    return Err(ProfileError::Knob(format!(
+                        "{part} has no value, accepted is {part}= and {accepted}"
+                    )));
+                }
                 None => return Err(ProfileError::Name(part.to_owned())),
             };
             let read = match value.parse::<f64>() {

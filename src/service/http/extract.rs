@@ -93,6 +93,12 @@ fn read_json<T: DeserializeOwned + PartialSchema>(body: &[u8]) -> Result<T, Prob
     if body.iter().all(u8::is_ascii_whitespace) {
         return Err(malformed("The body is empty.".to_owned()));
     }
+    // A body that is a list would be read as the fields in their order.
+    let is_object = body.trim_ascii_start().starts_with(b"{");
+    if !is_object && serde_json::from_slice::<IgnoredAny>(body).is_ok() {
+        let detail = format!("The body is {}.", given(body, ""));
+        return Err(Problem::value("", detail).accepting(whole()));
+    }
     let mut reader = serde_json::Deserializer::from_slice(body);
     let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         let parent = pointer(error.path());
@@ -105,9 +111,12 @@ fn read_json<T: DeserializeOwned + PartialSchema>(body: &[u8]) -> Result<T, Prob
         let message = message
             .rsplit_once(" at line ")
             .map_or(&*message, |(what, _)| what);
-        let pointer = named_field(message)
-            .filter(|_| parent.is_empty())
-            .map_or(parent, |name| format!("/{name}"));
+        let twice = field_after("duplicate field `", message);
+        let pointer = match (twice, field_after("missing field `", message)) {
+            (Some(name), _) => format!("{parent}/{name}"),
+            (None, Some(name)) if parent.is_empty() => format!("/{name}"),
+            _ => parent,
+        };
         let name = match pointer.trim_start_matches('/') {
             "" => "The body",
             name => name,
@@ -117,6 +126,13 @@ fn read_json<T: DeserializeOwned + PartialSchema>(body: &[u8]) -> Result<T, Prob
             (format!("{name} is a number out of range."), documented())
         } else if let Some(accepted) = workshop::accepted(message) {
             (format!("{message}."), Some(accepted.to_owned()))
+        } else if twice.is_some() {
+            let accepted = "one of the two".to_owned();
+            let last = given(body, &pointer);
+            (
+                format!("{name} is given twice, at last as {last}."),
+                Some(accepted),
+            )
         } else if is_about_names(message) {
             (sentence(message), expected(message))
         } else {
@@ -138,10 +154,13 @@ fn read_json<T: DeserializeOwned + PartialSchema>(body: &[u8]) -> Result<T, Prob
 
 /// The value at a pointer as it was sent, no more of it than fits in a line.
 fn given(body: &[u8], pointer: &str) -> String {
-    let body: serde_json::Value = serde_json::from_slice(body).unwrap_or_default();
-    let text = body
-        .pointer(pointer)
-        .map_or("missing".to_owned(), ToString::to_string);
+    let text = match serde_json::from_slice::<serde_json::Value>(body) {
+        Ok(body) => body
+            .pointer(pointer)
+            .map_or("missing".to_owned(), ToString::to_string),
+        // Numbers that are none, or lists in lists without end.
+        Err(_) => String::from_utf8_lossy(body.trim_ascii()).into_owned(),
+    };
     match text.char_indices().nth(LONGEST_GIVEN) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text,
@@ -150,10 +169,8 @@ fn given(body: &[u8], pointer: &str) -> String {
 
 /// What would be accepted, where a reader's message says it: "…, expected one of `a`, `b`".
 fn expected(message: &str) -> Option<String> {
-    if let Some(field) = message.strip_prefix("missing field `") {
-        return field
-            .split_once('`')
-            .map(|(name, _)| format!("an object with the field {name}"));
+    if let Some(name) = field_after("missing field `", message) {
+        return Some(format!("an object with the field {name}"));
     }
     let (_, rest) = message.rsplit_once(", expected ")?;
     let what = rest.strip_prefix("one of ").unwrap_or(rest);
@@ -162,22 +179,15 @@ fn expected(message: &str) -> Option<String> {
 
 /// Whether a reader's message is about the name of a field or of a choice.
 fn is_about_names(message: &str) -> bool {
-    [
-        "missing field",
-        "unknown field",
-        "duplicate field",
-        "unknown variant",
-    ]
-    .iter()
-    .any(|words| message.starts_with(words))
+    ["missing field", "unknown field", "unknown variant"]
+        .iter()
+        .any(|words| message.starts_with(words))
 }
 
-/// The field that an object lacks or has twice: the reader names it, but does not point at it.
-fn named_field(message: &str) -> Option<String> {
-    let rest = message
-        .strip_prefix("missing field `")
-        .or_else(|| message.strip_prefix("duplicate field `"))?;
-    rest.split_once('`').map(|(name, _)| name.to_owned())
+/// The field that a message names after these words: the reader does not point at what is missing or there twice.
+fn field_after<'a>(words: &str, message: &'a str) -> Option<&'a str> {
+    let (name, _) = message.strip_prefix(words)?.split_once('`')?;
+    Some(name)
 }
 
 fn sentence(message: &str) -> String {
@@ -283,6 +293,15 @@ mod tests {
         #[allow(dead_code)] // read by the reader only
         #[schema(exclusive_minimum = 0.0)]
         max_error: Option<f64>,
+        #[allow(dead_code)] // read by the reader only
+        light: Option<Towards>,
+    }
+
+    #[derive(Debug, Deserialize, ToSchema)]
+    #[serde(deny_unknown_fields)]
+    struct Towards {
+        #[allow(dead_code)] // read by the reader only
+        towards: f64,
     }
 
     #[test]
@@ -317,14 +336,26 @@ mod tests {
             ),
             (
                 r#"{"paints": [], "surprise": 1}"#,
-                "Unknown field `surprise`, expected one of `paints`, `clusters`, `scene`, `size`, `max_error`.",
-                "paints, clusters, scene, size, max_error",
+                "Unknown field `surprise`, expected one of `paints`, `clusters`, `scene`, `size`, `max_error`, `light`.",
+                "paints, clusters, scene, size, max_error, light",
             ),
             (
                 r"{}",
                 "Missing field `paints`.",
                 "an object with the field paints",
             ),
+            (
+                r#"{"paints": [], "paints": []}"#,
+                "paints is given twice, at last as [].",
+                "one of the two",
+            ),
+            (
+                r#"{"paints": [], "light": {"towards": 1, "towards": 2}}"#,
+                "light/towards is given twice, at last as 2.",
+                "one of the two",
+            ),
+            (" [1e999] ", "The body is [1e999].", "an object with paints"),
+            ("[[]]", "The body is [[]].", "an object with paints"),
             (
                 r#""paints""#,
                 "The body is \"paints\".",
