@@ -60,7 +60,14 @@ async fn the_bundle_of_a_blend_is_made_once_and_kept_for_ever() {
         async move { house.post_json("/v1/estimates", &text).await }
     };
     let told = estimate(json!({"work": "bundle", "blend": blend})).await;
-    assert_eq!(told.status, 200, "{}", told.text());
+    assert_eq!(
+        (told.status, &told.json()["kept"]),
+        (200, &json!(true)),
+        "{}",
+        told.text()
+    );
+    let other = json!({"work": "bundle", "blend": blend, "profile": {"draw": "alias"}});
+    assert_eq!(estimate(other).await.json()["kept"], false);
     for (order, pointer) in [
         (json!({"work": "bundle"}), "/blend"),
         (json!({"work": "bundle", "blend": "b_1"}), "/blend"),

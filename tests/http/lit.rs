@@ -42,6 +42,12 @@ async fn a_picture_is_lit_by_the_panorama_that_is_asked_for() {
     });
     let told = estimate(order).await;
     assert_eq!(told.status, 200, "{}", told.text());
+    assert_eq!(told.json()["kept"], false, "it was drawn with two samples");
+    let order = json!({
+        "work": "preview", "paint": paint, "size": [24, 16], "environment": blue,
+        "profile": { "samples_per_pixel": 2 },
+    });
+    assert_eq!(estimate(order).await.json()["kept"], true);
     let order = json!({
         "work": "preview", "paint": paint, "size": [24, 16], "environment": blue,
         "show": "aspecular",

@@ -101,7 +101,14 @@ async fn profiles_are_names_or_knobs_and_targets_are_answered_with_what_was_pick
         (estimate.status, &estimate.json()["seconds"]),
         (200, &json!(0.5))
     );
-    assert_eq!(estimate.json()["profile"], "draft");
+    let told = estimate.json();
+    assert_eq!(
+        (&told["profile"], &told["kept"]),
+        (&json!("draft"), &json!(true))
+    );
+    let greedy = json!({ "work": "blend", "paints": [a, b], "profile": { "transport": "greedy" } });
+    let greedy = house.post_json("/v1/estimates", &greedy.to_string()).await;
+    assert_eq!(greedy.json()["kept"], false, "{}", greedy.text());
     let target = json!({ "work": "preview", "paint": a, "max_error": 0.1 }).to_string();
     assert_eq!(
         house.post_json("/v1/estimates", &target).await.json()["met"],
@@ -126,6 +133,11 @@ async fn profiles_are_names_or_knobs_and_targets_are_answered_with_what_was_pick
         (file.status, file.header("carpaint-accuracy")),
         (200, Some("flakes-lab=0.25"))
     );
+    for (format, kept) in [("zip", true), ("glb", false)] {
+        let order = json!({ "work": "realise", "blend": id, "format": format });
+        let told = house.post_json("/v1/estimates", &order.to_string()).await;
+        assert_eq!(told.json()["kept"], kept, "{format}: {}", told.text());
+    }
     let settled = written("squared").await;
     let settled = settled.problem(400, "invalid-parameter");
     assert_eq!(

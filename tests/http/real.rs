@@ -374,6 +374,7 @@ async fn the_ingest_of_a_new_measurement_is_estimated_and_nothing_of_it_is_kept(
     assert_eq!(told.status, 200, "{}", told.text());
     let told = told.json();
     assert_eq!(told["profile"], "draft");
+    assert!(told.get("kept").is_none(), "{told}");
     assert!(told["seconds"].as_f64().is_some_and(|s| s > 0.0), "{told}");
     assert!(told["bytes"].as_u64().is_some_and(|b| b > 100), "{told}");
     let met = estimate("max_seconds=100", &new).await.json();

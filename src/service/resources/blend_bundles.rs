@@ -3,11 +3,19 @@
 use axum::extract::State;
 
 use super::files::FileAnswer;
+use crate::accuracy::Profile;
 use crate::service::app::App;
 use crate::service::http::{Address, Answer, BlendProblems, Problem, ProblemDocument, Query};
 use crate::service::ids;
 use crate::service::parameters::ProfileQuery;
+use crate::service::shelf::Shelved;
 use crate::service::work::{Asked, Works};
+use crate::store::Hash;
+
+/// Key of a blend's archive: everything that makes it.
+pub fn key(blend: &Shelved, profile: &Profile) -> Hash {
+    ids::result("blend_bundle", &(&blend.id, blend.file, profile.export))
+}
 
 /// All paints of a blend in one archive.
 ///
@@ -38,7 +46,7 @@ pub async fn bundle(
     });
     let (profile, picked) = found.await?;
     let answer = FileAnswer {
-        key: ids::result("blend_bundle", &(&blend.id, blend.file, profile.export)),
+        key: key(&blend, &profile),
         media_type: "application/zip",
         name: format!("{}.zip", blend.id),
         keep: blend.keep(),

@@ -5,11 +5,12 @@ use std::sync::Arc;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::documents::BlendDocument;
 use super::making;
+use crate::accuracy::Profile;
 use crate::paint::PaintFile;
 use crate::service::app::App;
 use crate::service::http::{
@@ -107,7 +108,7 @@ pub async fn create(
     } else {
         None
     };
-    let id = ids::made_of("b_", &(&order.paints, profile));
+    let id = id_of(&order.paints, &profile);
     let address = format!("/v1/blends/{id}");
     let job = if app.catalogue.blend(&id).await?.is_some() {
         None
@@ -120,6 +121,11 @@ pub async fn create(
     };
     let made = || app.blend(&id);
     making::answer(&app, prefer, job, &address, picked.as_ref(), made).await
+}
+
+/// Id of the blend of paints with these ids.
+pub fn id_of(paints: &[impl Serialize], profile: &Profile) -> String {
+    ids::made_of("b_", &(paints, profile))
 }
 
 /// Refuses paints that were clustered otherwise than asked for: paints are clustered when they are uploaded.

@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 pub use self::order::EstimateOrder;
 use self::order::WorkName;
 use super::uploads::{self, IngestQuery};
+use super::{blend_bundles, blends, realisations};
 use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::paint::PaintFile;
@@ -19,11 +20,11 @@ use crate::service::environments::Unread;
 use crate::service::http::{
     Answer, Json, Keep, Kind, NoQuery, Problem, ProblemDocument, Problems, Query,
 };
-use crate::service::parameters::{of_field, targets};
+use crate::service::parameters::{of_field, targets, view};
 use crate::service::shelf::Shelved;
 use crate::service::work::{
     Asked, Estimate, Format, IngestOrder, Layout, Picked, PictureFormat, Target, View,
-    WorkshopError, runner,
+    WorkshopError, drawing, runner,
 };
 use crate::store::{Hash, LocalBlob};
 use crate::workshop::{Environment, EstimatedError, Stage};
@@ -40,6 +41,11 @@ pub struct EstimateDocument {
     seconds: f64,
     /// The same by stage.
     stages: Vec<Stage>,
+    /// Of a blend, file or picture, whether it is kept already, as far as can be told without reading it: who asks for it
+    /// then waits for none of the work, whose `seconds` are told all the same. What makes a blend may be kept where the
+    /// blend itself is not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    kept: Option<bool>,
     /// Size of the answer, or of what is kept of it.
     bytes: u64,
     /// How far the answer is from the reference profile's.
@@ -73,8 +79,9 @@ struct Picture {
 /// Estimate a request.
 ///
 /// A small part of the work is done, here and now, and the rest is reckoned from it; writing, hashing and fits are reckoned
-/// by what this machine took when the service started, or in the study in its data folder. Nothing is kept. With
-/// `max_error` or `max_seconds` the answer says which profile would be picked.
+/// by what this machine took when the service started, or in the study in its data folder. Nothing is kept of
+/// it; `kept` says whether the work was done before. With `max_error` or `max_seconds` the answer says which profile would be
+/// picked.
 #[utoipa::path(
     post, operation_id = "create_estimate", path = "/v1/estimates", tag = "accuracy",
     request_body = EstimateOrder,
@@ -117,8 +124,10 @@ pub async fn create(
             None => error,
         })
     };
+    let needed = Arc::new(needed);
+    let on = Arc::clone(&needed);
     let estimated = app.bench.run(move || {
-        let environment = needed.environment().map_err(Problem::in_body)?;
+        let environment = on.environment().map_err(Problem::in_body)?;
         let estimate = |asked: &Asked<'_>| {
             if target.is_some() {
                 let picked = works.pick(asked, &target)?;
@@ -128,10 +137,15 @@ pub async fn create(
                 Ok(EstimateDocument::of(&estimate, None))
             }
         };
-        let done = needed.with_asked(environment.as_deref(), estimate);
+        let done = on.with_asked(environment.as_deref(), estimate);
         done.map_err(told)
     });
-    Ok(Answer::json(&estimated.await??, Keep::Never))
+    let estimated = estimated.await??;
+    let kept = needed.is_kept(&app, &estimated.knobs).await?;
+    Ok(Answer::json(
+        &EstimateDocument { kept, ..estimated },
+        Keep::Never,
+    ))
 }
 
 /// Estimate the ingest of a new measurement.
@@ -202,6 +216,7 @@ impl EstimateDocument {
             knobs: estimate.knobs,
             seconds: estimate.seconds,
             stages: estimate.stages.clone(),
+            kept: None,
             bytes: estimate.bytes,
             error: estimate.error,
             met: picked.map(|(met, _)| met),
@@ -272,6 +287,31 @@ impl Needed {
             Self::Realise(of, ..) | Self::Bundle(of) => std::slice::from_ref(of),
             Self::Preview(picture) => std::slice::from_ref(&picture.of),
         }
+    }
+
+    /// Whether the result with a profile is kept already; an ingest is once more by its very nature.
+    async fn is_kept(&self, app: &App, profile: &Profile) -> Result<Option<bool>, Problem> {
+        let key = match self {
+            Self::Ingest(..) => return Ok(None),
+            Self::Blend(paints) => {
+                let ids: Vec<&str> = paints.iter().map(|paint| paint.id.as_str()).collect();
+                let blend = app.catalogue.blend(&blends::id_of(&ids, profile)).await?;
+                return Ok(Some(blend.is_some()));
+            }
+            Self::Realise(of, weights, format) => {
+                realisations::key(of, weights.as_ref(), *format, profile)
+            }
+            Self::Bundle(blend) => blend_bundles::key(blend, profile),
+            Self::Preview(picture) => {
+                let view = View {
+                    samples_per_pixel: view::samples(picture.view.show, None, profile),
+                    ..picture.view.clone()
+                };
+                let weights = picture.weights.as_ref();
+                drawing::key(&picture.of, weights, &view, picture.format)
+            }
+        };
+        Ok(Some(app.results.holds(key).await))
     }
 
     /// The light of a picture, where that is not the built-in studio.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use axum::extract::State;
 
 use super::files::FileAnswer;
+use crate::accuracy::Profile;
 use crate::blend::RealisationWeights;
 use crate::service::app::App;
 use crate::service::http::{
@@ -14,6 +15,7 @@ use crate::service::ids;
 use crate::service::parameters::{ProfileQuery, WeightQuery};
 use crate::service::shelf::Shelved;
 use crate::service::work::{Asked, Format, Works};
+use crate::store::Hash;
 
 /// A blend at some weights, as a file.
 ///
@@ -64,6 +66,17 @@ pub async fn of_paint(
     realise(&app, paint, None, format, query).await
 }
 
+/// Key of a file: everything that makes it.
+pub fn key(
+    thing: &Shelved,
+    weights: Option<&RealisationWeights>,
+    format: Format,
+    profile: &Profile,
+) -> Hash {
+    let parts = (&thing.id, thing.file, weights, format, profile.export);
+    ids::result("realisation", &parts)
+}
+
 async fn realise(
     app: &App,
     thing: Arc<Shelved>,
@@ -83,10 +96,7 @@ async fn realise(
     });
     let (profile, picked) = found.await?;
     let answer = FileAnswer {
-        key: ids::result(
-            "realisation",
-            &(&thing.id, thing.file, &weights, format, profile.export),
-        ),
+        key: key(&thing, weights.as_ref(), format, &profile),
         media_type: format.media_type(),
         name: format!("{}.{}", thing.id, format.ending()),
         keep: thing.keep(),

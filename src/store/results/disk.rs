@@ -61,6 +61,15 @@ impl ResultFolder {
         self.folder.join(&name[..2]).join(name)
     }
 
+    /// Whether there is a file of this name, whole or not.
+    pub(super) async fn holds(&self, key: Hash) -> bool {
+        let found = tokio::fs::try_exists(self.place(key)).await;
+        found.unwrap_or_else(|error| {
+            tracing::warn!(%error, %key, "a stored result does not read");
+            false
+        })
+    }
+
     /// The result, if it is there and whole.
     pub(super) async fn read(&self, key: Hash) -> Option<CachedResult> {
         let place = self.place(key);

@@ -86,6 +86,11 @@ impl<E: Clone + Send + Sync + 'static> ResultCache<E> {
         self.memory.get(&key).await
     }
 
+    /// Whether the result is kept, as far as can be told without reading it.
+    pub async fn holds(&self, key: Hash) -> bool {
+        self.memory.contains_key(&key) || self.disk.holds(key).await
+    }
+
     /// The result of this key, from memory, from disk, or computed, once for all who ask at the same time.
     ///
     /// A computation that has begun goes on when its callers leave. Errors are handed to all who wait and not kept.

@@ -43,6 +43,26 @@ async fn sixteen_who_ask_at_once_cost_one_computation() {
 }
 
 #[tokio::test]
+async fn what_is_held_is_told_from_memory_and_from_disk() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let cache = open(folder.path());
+    assert!(!cache.holds(key(1)).await);
+    let blue = || async { Ok(Bytes::from_static(b"blue")) };
+    cache.get_or_compute(key(1), blue).await.expect("no error");
+    assert!(cache.holds(key(1)).await && !cache.holds(key(2)).await);
+    let in_time = async {
+        while !cache.disk.holds(key(1)).await {
+            tokio::time::sleep(Duration::from_millis(2)).await;
+        }
+    };
+    let written = tokio::time::timeout(Duration::from_secs(10), in_time);
+    written.await.expect("is written");
+    let reopened = open(folder.path());
+    assert!(reopened.in_memory(key(1)).await.is_none());
+    assert!(reopened.holds(key(1)).await && !reopened.holds(key(2)).await);
+}
+
+#[tokio::test]
 async fn a_computation_goes_on_when_its_caller_leaves() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let cache = open(folder.path());
