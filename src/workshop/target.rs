@@ -16,7 +16,7 @@ use utoipa::ToSchema;
 
 use super::estimate::{Estimate, EstimatedError, Work};
 use super::{Format, IngestOptions, WorkshopError, blend_paints, open_paints};
-use crate::accuracy::blend_error;
+use crate::accuracy::{Profile, blend_error};
 use crate::paint::PaintFile;
 use ladder::ladder;
 pub use picked::Picked;
@@ -155,9 +155,10 @@ impl Target {
         Ok(estimates)
     }
 
-    /// Estimates of the fastest and of ever finer ones: half of the finer ones is leapt over as long as the work is done in
-    /// time, half of what was leapt over is gone back otherwise, and no more is looked at than leaves time for the best that
-    /// is known. Of files the finest is the fastest, so that it is the one to look at.
+    /// Estimates from the usual profile on: half of the finer ones is leapt over as long as the work is done in time, half of
+    /// what was leapt over is gone back otherwise, and no more is looked at than leaves time for the best that is known.
+    /// Where nothing is done in time, the fastest is looked at too. Of files the finest is the fastest, so that it is the one
+    /// to look at.
     fn fast_enough(
         &self,
         work: &Work<'_>,
@@ -168,6 +169,7 @@ impl Target {
         if matches!(work, Work::Realise { .. } | Work::Bundle { .. }) {
             ladder.drain(..ladder.len() - 1);
         }
+        let usual = ladder.iter().position(|own| *own == Profile::standard());
         let mut estimates: Vec<(usize, Estimate)> = Vec::new();
         let (mut finer, mut too_slow) = (0, ladder.len());
         // Seconds of the last look, and of the best work that is known to be done in time.
@@ -179,10 +181,9 @@ impl Target {
             if !estimates.is_empty() && begun + dearer * last + at_hand > most {
                 break;
             }
-            let place = if estimates.is_empty() {
-                0
-            } else {
-                usize::midpoint(finer, too_slow)
+            let place = match usual {
+                Some(usual) if estimates.is_empty() => usual,
+                _ => usize::midpoint(finer, too_slow),
             };
             let estimate = work.estimate(&ladder[place])?;
             last = search.seconds() - begun;
@@ -195,6 +196,9 @@ impl Target {
                 went_back = true;
             }
             estimates.push((place, estimate));
+        }
+        if finer == 0 && too_slow > 0 {
+            estimates.push((0, work.estimate(&ladder[0])?));
         }
         estimates.sort_by_key(|(place, _)| *place);
         Ok(estimates.into_iter().map(|(_, own)| own).collect())
@@ -262,7 +266,6 @@ fn measure_error(work: &Work<'_>, estimate: &mut Estimate) -> Result<(), Worksho
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accuracy::Profile;
     use crate::workshop::Stage;
 
     fn estimate(seconds: f64, error: f64) -> Estimate {
