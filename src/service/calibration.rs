@@ -21,9 +21,7 @@ pub async fn calibrate(app: &App) {
     let figures = study.and_then(|study| study.machine);
     // It waits for the disk. What a panic leaves unknown is calibrated at the first estimate.
     let learned = tokio::task::spawn_blocking(move || learn_machine(figures, &folder));
-    if !learned.await.unwrap_or(false) {
-        tracing::warn!(
-            "somebody asked for an estimate before this machine was calibrated; what was found then holds"
-        );
+    if let Err(error) = learned.await {
+        tracing::warn!(%error, "this machine could not be calibrated");
     }
 }

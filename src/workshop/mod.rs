@@ -33,7 +33,8 @@ pub use bundling::bundle_blend;
 pub use describing::{blend_notes, describe_blend, describe_paint};
 pub use error::{Fault, Inside, WorkshopError, accepted};
 pub use estimate::{
-    Estimate, EstimatedError, PictureWork, Stage, Work, learn_machine, sample_to_estimate,
+    Estimate, EstimatedError, PictureWork, Stage, Work, learn_machine, receive_stage,
+    sample_to_estimate,
 };
 pub use evaluating::{Pairs, Values, evaluate, evaluate_raw};
 pub use ingest::{

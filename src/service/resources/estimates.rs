@@ -27,7 +27,7 @@ use crate::service::work::{
     WorkshopError, drawing, runner,
 };
 use crate::store::{Hash, LocalBlob};
-use crate::workshop::{Environment, EstimatedError, Stage};
+use crate::workshop::{Environment, EstimatedError, Stage, receive_stage};
 
 /// What a request will take.
 #[derive(Debug, Serialize, ToSchema)]
@@ -188,11 +188,16 @@ async fn estimate_upload(
     order: IngestOrder,
     target: Target,
 ) -> Result<EstimateDocument, Problem> {
+    let (local, works) = (app.upload_at_hand(upload).await?, Arc::clone(&app.works));
+    let file = tokio::fs::metadata(local.path()).await;
+    let bytes = file.map_or(0, |file| file.len());
+    #[allow(clippy::cast_precision_loss)] // a size
+    let receive = move || receive_stage(bytes as f64);
     if target.is_some() {
-        let picked = uploads::pick_for_upload(app, upload, &order, target).await?;
+        let mut picked = uploads::pick_for_upload(app, upload, &order, target).await?;
+        picked.estimate = picked.estimate.after(vec![app.bench.run(receive).await?]);
         return Ok(EstimateDocument::of_picked(&picked));
     }
-    let (local, works) = (app.upload_at_hand(upload).await?, Arc::clone(&app.works));
     let estimated = app.bench.run(move || {
         let asked = Asked::Ingest {
             upload: local.path(),
@@ -200,7 +205,8 @@ async fn estimate_upload(
         };
         let file = local.path().display().to_string();
         let estimate = works.estimate(&asked, &order.profile);
-        estimate.map_err(|error| Problem::of_upload(error.without(&file)))
+        let estimate = estimate.map_err(|error| Problem::of_upload(error.without(&file)))?;
+        Ok::<_, Problem>(estimate.after(vec![receive()]))
     });
     Ok(EstimateDocument::of(&estimated.await??, None))
 }

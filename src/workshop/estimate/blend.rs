@@ -2,8 +2,8 @@
 
 use super::ingest::{Sampled, of_paint, sample};
 use super::{
-    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, cold, extrapolated, steady, this_machine,
-    timed, write_stage,
+    Estimate, EstimatedError, FEW_ANGLES, Sizes, Stage, cold, extrapolated, job_seconds, steady,
+    this_machine, timed, write_stage,
 };
 use crate::accuracy::{Profile, blend_error};
 use crate::blend::{Blend, Order};
@@ -46,21 +46,18 @@ pub fn estimate_blend_of(
 }
 
 /// Angles of the samples. Where a blend is compared with what each pair could have alone, or with exact transport, that
-/// is done on some slices of a large grid and on all of a small one: samples have to be beyond that. Beside Sinkhorn steps
-/// the comparison is nothing, and they are long enough as they are.
+/// is done on some slices of a large grid and on all of a small one: samples have to be beyond that.
 fn sizes(paints: usize, profile: &Profile) -> Sizes {
-    match (paints, profile.blend.method, profile.blend.cost) {
-        (2, Method::Exact, Cost::Distance) => FEW_ANGLES,
-        (2, Method::Sinkhorn { .. }, _) => SOME_ANGLES,
-        _ => MANY_ANGLES,
+    let alike = profile.blend.method == Method::Exact && profile.blend.cost == Cost::Distance;
+    if paints == 2 && alike {
+        FEW_ANGLES
+    } else {
+        MANY_ANGLES
     }
 }
 
 /// Goes of a sample that takes little time.
 const GOES: usize = 3;
-
-/// Angles of samples of slices that are slow.
-const SOME_ANGLES: Sizes = [4, 8];
 
 /// Angles of samples of more slices than are compared.
 const MANY_ANGLES: Sizes = [9, 14];
@@ -72,12 +69,8 @@ const CANONICAL: &str = "three and more paints are joined in the order of their 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kept {
     InFile,
-    /// Its catalogue is written to [`COMMITS`] times: when a job is queued, taken up and done.
     InStore,
 }
-
-/// Times that keeping a blend in a store writes as much as a file's end takes.
-const COMMITS: f64 = 3.0;
 
 fn of_samples(
     sampled: &[Sampled],
@@ -134,7 +127,7 @@ fn of_samples(
         }
         Kept::InStore => stages.push(Stage {
             stage: "store",
-            seconds: encode + write(bytes) + COMMITS * write(0.0),
+            seconds: encode + write(bytes) + job_seconds(),
         }),
     }
     let error = blend_error(&large.1);

@@ -1,17 +1,41 @@
 //! The cost model's constants: what this machine takes for steps that no part of a request tells.
 //!
-//! Calibrated quickly when first needed (a few hundredths of a second; the service does it when it starts), or thoroughly
-//! by a study, whose figures a service that has the study in its data folder takes instead.
+//! Calibrated quickly when needed (a few hundredths of a second; the service does it when it starts, and again where that
+//! was a while ago, for a busy minute says little of the next), or thoroughly by a study, whose figures a service that has
+//! the study in its data folder takes instead.
 
-use std::path::Path;
-use std::sync::OnceLock;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use super::{extrapolated, timed};
 use crate::accuracy::study::Machine;
 use crate::fit::FITTED_ANGLES;
 use crate::paint::{AngleGrid, CarPaint, Chi, ColorTable, Lobe, Reflectance, instrument_pairs};
 
-static HERE: OnceLock<Machine> = OnceLock::new();
+static HERE: Mutex<Option<Known>> = Mutex::new(None);
+
+/// What is known of this machine.
+struct Known {
+    machine: Machine,
+    /// The disk that was written to.
+    folder: PathBuf,
+    /// When it was calibrated; a study's figures stay.
+    since: Option<Instant>,
+}
+
+/// How long a quick calibration holds.
+const HOLDS: Duration = Duration::from_secs(20);
+
+impl Known {
+    fn quickly(folder: PathBuf) -> Self {
+        Self {
+            machine: calibrated(QUICK, &folder),
+            folder,
+            since: Some(Instant::now()),
+        }
+    }
+}
 
 /// Goes of a quick and of a thorough calibration.
 const QUICK: usize = 3;
@@ -21,18 +45,34 @@ const THOROUGH: usize = 15;
 const SMALL: u16 = 1 << 12;
 const LARGE: u32 = 1 << 20;
 
-/// This machine: as it was learned, otherwise calibrated at the first call, with the disk of temporary files.
+/// This machine: as it was learned, or calibrated a moment ago, or now, with the disk of the folder that was learned with
+/// or of temporary files.
 #[must_use]
-pub fn this_machine() -> &'static Machine {
-    HERE.get_or_init(|| calibrated(QUICK, &std::env::temp_dir()))
+pub fn this_machine() -> Machine {
+    let mut here = HERE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = match here.take() {
+        Some(known) if known.since.is_none_or(|since| since.elapsed() < HOLDS) => {
+            return here.insert(known).machine;
+        }
+        Some(known) => known.folder,
+        None => std::env::temp_dir(),
+    };
+    here.insert(Known::quickly(folder)).machine
 }
 
 /// Learns this machine: by a study's figures where they are times, otherwise by a quick calibration with the disk of this
-/// folder. `false` when it was known already, which it then stays.
-pub fn learn_machine(study: Option<Machine>, folder: &Path) -> bool {
-    let sound = study.filter(Machine::is_sound);
-    HERE.set(sound.unwrap_or_else(|| calibrated(QUICK, folder)))
-        .is_ok()
+/// folder.
+pub fn learn_machine(study: Option<Machine>, folder: &Path) {
+    let folder = folder.to_owned();
+    let known = match study.filter(Machine::is_sound) {
+        Some(machine) => Known {
+            machine,
+            folder,
+            since: None,
+        },
+        None => Known::quickly(folder),
+    };
+    *HERE.lock().unwrap_or_else(PoisonError::into_inner) = Some(known);
 }
 
 /// This machine, thoroughly, with the disk of this folder.

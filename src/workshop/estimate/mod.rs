@@ -177,6 +177,25 @@ fn write_stage(bytes: f64) -> Option<Stage> {
     Some(Stage { stage, seconds })
 }
 
+/// Times that a job writes to its store's catalogue as much as a file's end takes: when it is queued, taken up and done.
+const COMMITS: f64 = 3.0;
+
+/// What a job writes of itself.
+fn job_seconds() -> f64 {
+    COMMITS * this_machine().write_seconds(0.0).unwrap_or(0.0)
+}
+
+/// What a service takes to hash and keep an upload of so many bytes and to make a job of it, beside the job itself.
+#[must_use]
+pub fn receive_stage(bytes: f64) -> Stage {
+    let machine = this_machine();
+    let kept = machine.write_seconds(bytes).unwrap_or(0.0);
+    Stage {
+        stage: "receive",
+        seconds: machine.hash_seconds(bytes) + kept + job_seconds(),
+    }
+}
+
 /// Seconds that something takes, and what it gives.
 fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let begun = Instant::now();

@@ -1,6 +1,6 @@
 //! Estimates of a picture.
 
-use super::{Estimate, EstimatedError, Stage, extrapolated, shortest, timed, write_stage};
+use super::{Estimate, EstimatedError, Stage, extrapolated, steady, timed, write_stage};
 use crate::accuracy::{PictureError, Profile};
 use crate::blend::RealisationWeights;
 use crate::paint::Limits;
@@ -30,6 +30,9 @@ const LEAST_SHARE: f64 = 0.25;
 /// By how many times the samples of a picture that is small itself are more, to the same end.
 const MORE: u32 = 32;
 
+/// Goes of a small picture that takes little time.
+const GOES: usize = 3;
+
 /// Samples per pixel from which on time is proportional to them.
 const ENOUGH: u32 = 8;
 
@@ -49,7 +52,7 @@ struct SmallPicture {
 }
 
 /// Work, pixels times batches of samples, up to which a picture is drawn itself to tell what it takes: that is about what
-/// its samples come to, each drawn three times.
+/// its samples come to, each drawn [`GOES`] times.
 const LITTLE: f64 = 4.0 * 160.0 * 160.0 * 2.0;
 
 /// Samples come in batches: up to one a pixel takes about the same.
@@ -274,7 +277,9 @@ pub fn estimate_preview(
     let small = if whole <= LITTLE {
         SmallPictures::of(&itself, timed(|| work.draw(&itself)))?
     } else if work.options.show.is_paint() {
-        SmallPictures::draw(work, few, &SIDES, whole, |of| shortest(|| work.draw(&of)))?
+        SmallPictures::draw(work, few, &SIDES, whole, |of| {
+            steady(GOES, || work.draw(&of))
+        })?
     } else {
         SmallPictures::draw(work, 1, &SIDES_OF_ANGLES, whole, |of| {
             timed(|| work.draw(&of))
