@@ -79,7 +79,7 @@ struct Picture {
 /// Estimate a request.
 ///
 /// A small part of the work is done, here and now, and the rest is reckoned from it; writing, hashing and fits are reckoned
-/// by what this machine took when the service started, or in the study in its data folder. Nothing is kept of
+/// by what this machine took a moment ago, or in the study in its data folder. Nothing is kept of
 /// it; `kept` says whether the work was done before. With `max_error` or `max_seconds` the answer says which profile would be
 /// picked.
 #[utoipa::path(

@@ -1,11 +1,11 @@
 //! What a request will cost and how accurate it will be, before it is made.
 //!
 //! A request is estimated by doing a small part of it on this machine, now: every k-th angle of the very paints, a few
-//! pixels of the very picture. Time and bytes of two such samples, one larger than the other, give what is fixed and what
-//! grows with the work; the error is measured on the larger sample. A sample takes a few hundredths of the time of the
-//! whole, and as it runs under the same load, the estimate is of this machine as it is. What cannot be done in part is
-//! reckoned from what a [machine](this_machine) was calibrated to take: writing to the disk, hashing, and the fit of a
-//! bare reflectance table, which costs as much as a number of evaluations of a paint.
+//! pixels of the very picture; what is soon done is done whole. Time and bytes of two such samples, one larger than the
+//! other, give what is fixed and what grows with the work; the error is measured on the larger sample. A sample takes a
+//! few hundredths of the time of the whole, and as it runs under the same load, the estimate is of this machine as it is.
+//! What cannot be done in part is reckoned from what a [machine](this_machine) was calibrated to take: writing to the
+//! disk, hashing, and the fit of a bare reflectance table, which costs as much as a number of evaluations of a paint.
 //!
 //! Results never depend on an estimate; what is picked for a time limit does.
 

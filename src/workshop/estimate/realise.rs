@@ -60,8 +60,8 @@ pub fn estimate_bundle(
     of_file(thing, profile, written, &error, &make)
 }
 
-/// What `make` will take on the whole, by what it takes on two samples; the error is of the whole, for its range says how
-/// coarsely it is rounded.
+/// What `make` will take: it is done where that is soon done, otherwise told by what it takes on two samples. The error is
+/// of the whole, for its range says how coarsely it is rounded.
 fn of_file(
     thing: &Thing,
     profile: &Profile,
