@@ -20,8 +20,8 @@ use crate::workshop::{
 
 /// Estimate seconds, bytes and error of a command before running it.
 ///
-/// A small part of the work is done, on this machine and now, and the rest is reckoned from it. With --max-error or
-/// --max-seconds it says which profile would be picked.
+/// A small part of the work is done, on this machine and now, and the rest is reckoned from it; what is soon done is done
+/// whole. With --max-error or --max-seconds it says which profile would be picked.
 #[derive(Args, Clone, Debug)]
 pub struct Estimate {
     #[command(subcommand)]

@@ -13,7 +13,7 @@ use crate::blend::RealisationWeights;
 use crate::paint::{CarPaint, Limits};
 use crate::render::{self, DirectionalLight, Environment, RenderError, Scene, Shape};
 
-/// Most samples of one picture that a service draws or a target is looked for with: pixels times samples per pixel.
+/// Most samples of one picture that a service draws: pixels times samples per pixel.
 pub const MOST_SAMPLES: u64 = 1 << 28;
 
 /// What a picture shows on the object.

@@ -1,7 +1,7 @@
 //! A target in place of knobs: the cheapest profile that is accurate enough, or the most accurate that is fast enough.
 //!
-//! The profiles of a short ladder are estimated on the work itself, from cheap to dear: for an error until one will do, for
-//! a time as long as another look leaves time for the best that is known. Where an estimate's error is of a sample of the
+//! The profiles of a short ladder are estimated on the work itself: for an error from cheap to dear until one will do, for a
+//! time from the usual one on as long as another look leaves time for the best that is known. Where an estimate's error is of a sample of the
 //! slices, it is measured in full before a profile is picked for it, unless the part that is known is too much already.
 //! What is picked for a time limit depends on the machine; the result depends on the profile picked and on nothing else.
 
@@ -14,7 +14,7 @@ use std::time::Instant;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::estimate::{Estimate, EstimatedError, Work};
+use super::estimate::{Estimate, EstimatedError, Work, this_machine};
 use super::{Format, IngestOptions, WorkshopError, blend_paints, open_paints};
 use crate::accuracy::{Profile, blend_error};
 use crate::paint::PaintFile;
@@ -169,6 +169,8 @@ impl Target {
         if matches!(work, Work::Realise { .. } | Work::Bundle { .. }) {
             ladder.drain(..ladder.len() - 1);
         }
+        // A look should take what looks take.
+        let _ = this_machine();
         let usual = ladder.iter().position(|own| *own == Profile::standard());
         let mut estimates: Vec<(usize, Estimate)> = Vec::new();
         let (mut finer, mut too_slow) = (0, ladder.len());
@@ -197,7 +199,10 @@ impl Target {
             }
             estimates.push((place, estimate));
         }
-        if finer == 0 && too_slow > 0 {
+        // A look may have taken what was left of the time.
+        let searched = search.seconds();
+        let is_late = (estimates.iter()).all(|(_, own)| !self.is_in_time(own, searched));
+        if is_late && estimates.iter().all(|(place, _)| *place > 0) {
             estimates.push((0, work.estimate(&ladder[0])?));
         }
         estimates.sort_by_key(|(place, _)| *place);

@@ -250,8 +250,8 @@ fn beside_knee(front: &Front) -> Option<String> {
 fn growth(page: &mut String, study: &Study) {
     page.push_str(
         "## How time grows\n\n![Time against size](growth.svg)\n\nExponents scatter by a tenth from run to run; what is \
-         above its limit by less counts as kept. What is said of a blend alone begins with ingested paints: from pictures \
-         on it is a part of the row above, and where it misses its limit that is felt at the larger sizes only.\n\n| with | what is done | from | to | time grows as | \
+         above its limit by less counts as kept. What is said of a blend alone begins with ingested paints; the row \
+         without that has the pictures too, and the blend is a part of it.\n\n| with | what is done | from | to | time grows as | \
          should be at most |\n|---|---|---:|---:|---|---|\n",
     );
     for growth in &study.growth {

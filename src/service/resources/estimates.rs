@@ -190,12 +190,13 @@ async fn estimate_upload(
 ) -> Result<EstimateDocument, Problem> {
     let (local, works) = (app.upload_at_hand(upload).await?, Arc::clone(&app.works));
     let file = tokio::fs::metadata(local.path()).await;
-    let bytes = file.map_or(0, |file| file.len());
+    let bytes = file.map_err(Problem::internal)?.len();
     #[allow(clippy::cast_precision_loss)] // a size
     let receive = move || receive_stage(bytes as f64);
     if target.is_some() {
-        let mut picked = uploads::pick_for_upload(app, upload, &order, target).await?;
-        picked.estimate = picked.estimate.after(vec![app.bench.run(receive).await?]);
+        let picked = uploads::pick_for_upload(app, upload, &order, target).await?;
+        let receive = tokio::task::spawn_blocking(receive).await;
+        let picked = picked.after(receive.map_err(Problem::internal)?);
         return Ok(EstimateDocument::of_picked(&picked));
     }
     let estimated = app.bench.run(move || {

@@ -23,7 +23,7 @@ use crate::workshop::{
 
 /// A paint that may be still to be ingested, with a few of its angles.
 pub(super) struct Sampled {
-    /// About 4 and about 8 angles on an axis.
+    /// As many angles on an axis as its `Sizes` say.
     pub paints: [PaintFile; 2],
     /// Angles of θh and θd in full; `None` for a solid color.
     pub angles: Option<[usize; 2]>,

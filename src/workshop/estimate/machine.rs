@@ -61,9 +61,12 @@ pub fn this_machine() -> Machine {
 }
 
 /// Learns this machine: by a study's figures where they are times, otherwise by a quick calibration with the disk of this
-/// folder.
-pub fn learn_machine(study: Option<Machine>, folder: &Path) {
-    let folder = folder.to_owned();
+/// data folder, in a folder of its own: what a kill leaves there is gone with the next start.
+pub fn learn_machine(study: Option<Machine>, data: &Path) {
+    let folder = data.join("calibration");
+    // Where there is none, calibration finds that nothing can be written.
+    let _ = std::fs::remove_dir_all(&folder);
+    let _ = std::fs::create_dir(&folder);
     let known = match study.filter(Machine::is_sound) {
         Some(machine) => Known {
             machine,

@@ -1,9 +1,9 @@
 //! What a request will cost and how accurate it will be, before it is made.
 //!
 //! A request is estimated by doing a small part of it on this machine, now: every k-th angle of the very paints, a few
-//! pixels of the very picture; what is soon done is done whole. Time and bytes of two such samples, one larger than the
-//! other, give what is fixed and what grows with the work; the error is measured on the larger sample. A sample takes a
-//! few hundredths of the time of the whole, and as it runs under the same load, the estimate is of this machine as it is.
+//! pixels of the very picture. Time and bytes of two such samples, one larger than the other, give what is fixed and what
+//! grows with the work; the error is measured on the larger sample. A sample takes a few hundredths of the time of the
+//! whole, and as it runs under the same load, the estimate is of this machine as it is. What is soon done is done whole.
 //! What cannot be done in part is reckoned from what a [machine](this_machine) was calibrated to take: writing to the
 //! disk, hashing, and the fit of a bare reflectance table, which costs as much as a number of evaluations of a paint.
 //!
@@ -193,6 +193,17 @@ pub fn receive_stage(bytes: f64) -> Stage {
     Stage {
         stage: "receive",
         seconds: machine.hash_seconds(bytes) + kept + job_seconds(),
+    }
+}
+
+/// Times that copying and hashing a result in memory takes as long as hashing a file that the system has at hand.
+const KEEPING: f64 = 2.0;
+
+/// What a service takes to keep a result of this size among those it has at hand.
+fn keep_stage(bytes: f64) -> Stage {
+    Stage {
+        stage: "keep",
+        seconds: KEEPING * this_machine().hash_seconds(bytes),
     }
 }
 

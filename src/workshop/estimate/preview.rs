@@ -1,6 +1,8 @@
 //! Estimates of a picture.
 
-use super::{Estimate, EstimatedError, Stage, extrapolated, steady, timed, write_stage};
+use super::{
+    Estimate, EstimatedError, Stage, extrapolated, keep_stage, steady, timed, write_stage,
+};
 use crate::accuracy::{PictureError, Profile};
 use crate::blend::RealisationWeights;
 use crate::paint::Limits;
@@ -118,6 +120,8 @@ impl SmallPictures {
         let mut stages = self.stages(seconds);
         if work.written {
             stages.extend(write_stage(bytes));
+        } else {
+            stages.push(keep_stage(bytes));
         }
         let error = EstimatedError::of_picture(error);
         let drawn_with = Profile {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::{
-    Estimate, EstimatedError, Stage, extrapolated, shortest, step_for, this_machine, timed,
+    Estimate, EstimatedError, Stage, extrapolated, keep_stage, shortest, step_for, timed,
     write_stage,
 };
 use crate::accuracy::{Profile, ResultError, bundle_error};
@@ -16,7 +16,8 @@ use crate::workshop::{Lap, Thing, WorkshopError};
 /// Angles on an axis of the two samples: writing has a fixed part that small samples say little of.
 const ANGLES: [usize; 2] = [4, 9];
 
-/// Clusters up to which a file is made once, whole, to tell what it takes: that is done in some hundredths of a second.
+/// Clusters up to which a file is made whole to tell what it takes, once, or twice where a service keeps it: that is done in some
+/// hundredths of a second.
 const FEW_CLUSTERS: usize = 150_000;
 
 /// What the first go takes longer than the shortest of three: nobody's memory is warm then.
@@ -126,7 +127,7 @@ fn of_file(
     Ok(of_stages(stages, (profile, written, bytes, error)))
 }
 
-/// These stages, and writing so many bytes; or copying and hashing them, where a service keeps them.
+/// These stages, and writing so many bytes, or keeping them.
 fn of_stages(
     mut stages: Vec<Stage>,
     (profile, written, bytes, error): (&Profile, bool, f64, &ResultError),
@@ -134,9 +135,7 @@ fn of_stages(
     if written {
         stages.extend(write_stage(bytes));
     } else {
-        let seconds = 2.0 * this_machine().hash_seconds(bytes);
-        let stage = "keep";
-        stages.push(Stage { stage, seconds });
+        stages.push(keep_stage(bytes));
     }
     Estimate::new(profile, stages, bytes, EstimatedError::lab(error))
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::Target;
 use crate::accuracy::{Knobs, Profile};
-use crate::workshop::Estimate;
+use crate::workshop::{Estimate, Stage};
 
 /// A profile picked for a target.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -16,7 +16,7 @@ pub struct Picked {
     pub met: bool,
     /// The profile, and what the work will take with it.
     pub estimate: Estimate,
-    /// How many profiles were looked at, from cheap to dear.
+    /// How many profiles were looked at.
     pub tried: usize,
     /// Seconds that took.
     pub searched: f64,
@@ -28,6 +28,14 @@ impl Picked {
     pub fn at_hand(mut self) -> Self {
         self.searched = 0.0;
         self.met = self.target.is_met(&self.estimate, 0.0);
+        self
+    }
+
+    /// The same with a stage that comes before the work.
+    #[must_use]
+    pub fn after(mut self, stage: Stage) -> Self {
+        self.estimate = self.estimate.after(vec![stage]);
+        self.met = self.target.is_met(&self.estimate, self.searched);
         self
     }
 
