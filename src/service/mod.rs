@@ -10,7 +10,7 @@
 //! | `app` | what all handlers share: the store, the work, the counts |
 //! | `shelf`, `keeping`, `uploading` | paints and blends as they are read, kept and removed, and uploads until they are named |
 //! | `environments` | environments as pictures are lit with them |
-//! | `calibration` | what this machine takes, learned before anybody asks |
+//! | `calibration` | what this machine takes, learned before anybody asks; estimates learn it again after a while |
 //!
 //! Promised: what was acknowledged survives a kill; the same request gives the same bytes, computed once however many
 //! ask; nothing internal leaves in an error. Left to others: what a paint is (`workshop`), how bytes are kept (`store`),

@@ -2,10 +2,10 @@
 //! meets a target; the self-test; the study. What both doors, HTTP and command line, call.
 //!
 //! Functions here are synchronous and compute; they read the files they are told to read, and give bytes to whoever keeps
-//! them. Estimates and the study look at a clock, and write a file of no name to learn what writing takes; what was made
-//! tells beside itself how long its stages took. No bytes depend on a clock, but for the profile that is picked for a time.
-//! Long work takes a function that hears the share done. Knobs by which a paint or a blend was made are not turned
-//! afterwards: [`settled`] says which. Every failure is a [`WorkshopError`] that says whose fault it is.
+//! them. Estimates and the study look at a clock, and write small files that they take away again to learn what writing
+//! takes; what was made tells beside itself how long its stages took. No bytes depend on a clock, but for the profile that
+//! is picked for a time. Long work takes a function that hears the share done. Knobs by which a paint or a blend was made
+//! are not turned afterwards: [`settled`] says which. Every failure is a [`WorkshopError`] that says whose fault it is.
 
 mod blending;
 mod bundling;
